@@ -97,6 +97,14 @@ class ComponentFileError(ComponentError):
     exit_code = 2
 
 
+class LostComponentError(ComponentError):
+    """The process or the machine of a component is gone; another run may go well."""
+
+
+class LateComponentError(LostComponentError):
+    """A component elsewhere has not answered in time."""
+
+
 class RigError(VibroimpactError):
     """A rig refused a call, or failed, while a program used it."""
 

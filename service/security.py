@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import hmac
 import logging
-import os
 import re
-import secrets
 import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.access_token import token_at
 from vibroimpact.service.connections import KNOWN
 from vibroimpact.service.hosts import Hosts
 from vibroimpact.service.page_files import page_files
@@ -37,7 +35,6 @@ HEADERS = (
 )
 
 _LENGTH = re.compile(rb"[0-9]{1,15}")
-_TOKEN = re.compile(r"[!-~]+")
 _JOB = re.compile(r"/campaigns/([0-9a-f]{32})")
 
 Scope = MutableMapping[str, Any]
@@ -48,39 +45,8 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 
 def token_of(folder: Path) -> str:
-    """Return the token of a service, made at its first start in a file that only its owner reads.
-
-    Raise UsageError if others may read the file, or if it holds no token.
-    """
-    path = folder / "token"
-    try:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError:
-        if os.name == "posix" and path.is_file() and path.stat().st_mode & 0o077:
-            raise UsageError(
-                f"{path}: expected a file that only you can read, got mode {path.stat().st_mode & 0o777:04o}. "
-                "Others may know the token: delete the file, and a new one is made."
-            ) from None
-        return _token_in(path)
-    except OSError as error:
-        raise UsageError(f"{path}: expected a file for the token, got {error.strerror}.") from None
-    token = secrets.token_urlsafe(32)
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(f"{token}\n")
-    return token
-
-
-def _token_in(path: Path) -> str:
-    try:
-        token = path.read_text(encoding="ascii").strip()
-    except OSError as error:
-        raise UsageError(f"{path}: expected a token, got {error.strerror}. Delete it.") from None
-    except UnicodeDecodeError:
-        raise UsageError(f"{path}: expected a token, got no text of ASCII. Delete it.") from None
-    if not _TOKEN.fullmatch(token):
-        got = "blanks in it" if token else "an empty file"
-        raise UsageError(f"{path}: expected a token, got {got}. Delete it.")
-    return token
+    """Return the token of a service: see `token_at`."""
+    return token_at(folder / "token")
 
 
 class Guarded:

@@ -35,13 +35,14 @@ GROUPS: Mapping[str, Group] = {
         "analysis.commands.estimate_group:EstimateGroup",
     ),
     "fmu": Group(
-        "List, build, check and export the FMUs of the package.",
+        "List, build, check, export and serve FMUs.",
         {
             "list": "fmus.operations.fmu_list:ListFmus",
             "build": "fmus.operations.fmu_build:BuildFmus",
             "check": "fmus.operations.fmu_check:CheckFmus",
             "replay": "analysis.operations.fmu_replay:ExportReplay",
             "export": "orchestrator.operations.fmu_export:ExportFmu",
+            "serve": "orchestrator.operations.fmu_serve:ServeFmu",
         },
     ),
     "ssp": Group(

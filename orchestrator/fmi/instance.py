@@ -98,6 +98,9 @@ class Instance(ABC):
     state_word: ClassVar[str]
     type_names: ClassVar[Mapping[str, str]] = {}
     """Names of types in the names of functions, if they differ from FMI 3.0's."""
+    runs_here: ClassVar[bool] = True
+    """Its functions run in this process, so that C code can call them."""
+    group_type: ClassVar[type[VariableGroup]] = VariableGroup
 
     def __init__(
         self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
@@ -110,13 +113,16 @@ class Instance(ABC):
         self.is_fatal = False
         self.internal_step = self.only_step = 0.0
         self.changed_rounding = False
-        self._library = Library(fmu)
+        self._load(fmu)
         self.wrap = wrap
         self._pointer = c_void_p()
         self._step_time, self._step_size = c_double(), c_double()
         self._do_step: Callable[[], int]
 
     # ---- binding ----
+
+    def _load(self, fmu: UnpackedFmu) -> None:
+        self._library = Library(fmu)
 
     def _function(self, name: str, result: Any = ctypes.c_int) -> Function:
         found = self._library.function(self.prefix + name, result)
@@ -187,7 +193,7 @@ class Instance(ABC):
             count = len(references) if size is None else size
             values = np.zeros(count, dtype=DTYPES[self.fmi_version][kind])
         name = self.type_names.get(kind, kind)
-        return VariableGroup(
+        return self.group_type(
             name,
             (self._function("Get" + name), self._function("Set" + name)),
             self._pointer,

@@ -6,6 +6,7 @@ A component that logs a million lines costs no memory and no call into Python.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable
 
 from vibroimpact.fmus.core import core_library
 
@@ -38,6 +39,12 @@ class LogTail:
     def environment(self) -> ctypes.c_void_p:
         """Pointer for the component's callbacks."""
         return ctypes.c_void_p(ctypes.addressof(self._ring))
+
+    def add(self, lines: Iterable[str]) -> None:
+        """Add lines that a component has logged elsewhere."""
+        for line in lines:
+            self._ring.lines[int(self._ring.count) % LINES].value = line.encode()[: LENGTH - 1]
+            self._ring.count += 1
 
     def take(self) -> tuple[str, ...]:
         """Return the last lines since the previous call, oldest first."""

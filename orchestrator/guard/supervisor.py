@@ -1,9 +1,9 @@
 """A process between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
 
 It is started as `python -m` with the descriptor of the bell (`pipe`), and forks before any large import. The fork runs
-the points (`child`) in a process group of its own. The supervisor runs no code of an FMU, so none can crash it. It
-kills all remaining processes if the fork ends, or if the guard closes its pipe, dies, or sends SIGTERM. Then it ends
-as the fork has ended.
+the points (`child`), or `main` of the module that a second argument names, in a process group of its own. The
+supervisor runs no code of an FMU, so none can crash it. It kills all remaining processes if the fork ends, or if the
+guard closes its pipe, dies, or sends SIGTERM. Then it ends as the fork has ended.
 
 On Linux it is the reaper of its descendants: processes that left the group (setsid) come back to it. Elsewhere it
 knows only the process group.
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import importlib
 import os
 import select
 import signal
@@ -57,9 +58,9 @@ def main() -> None:
 
 
 def _serve(bell: int | None) -> None:
-    from vibroimpact.orchestrator.guard.child import main  # heavy, and not needed by the supervisor
-
-    main(bell)
+    # heavy, and not needed by the supervisor
+    module = importlib.import_module(sys.argv[2] if sys.argv[2:] else "vibroimpact.orchestrator.guard.child")
+    module.main(bell)
 
 
 def _control_process(option: int, value: int) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 from weakref import WeakValueDictionary
 
-from vibroimpact.fmus.errors import ComponentError, ComponentFileError
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError, LostComponentError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.orchestrator.fmi.capabilities import (
     NEEDED_OF_CLOCKS,
@@ -33,6 +33,7 @@ from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmi.shapes import STRUCTURAL, Shape, default_sizes, dimensions_of, shape_of
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, StartValue
+from vibroimpact.orchestrator.remote.address import FmuServer
 
 if TYPE_CHECKING:
     from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable
@@ -112,12 +113,13 @@ class Component:
     ) -> None:
         self.spec = spec
         self.name = spec.name
-        description = description_of(spec.fmu)
+        file = spec.fmu if spec.server is None else self._described_there(spec.server)
+        description = description_of(file)
         self.kind = kind_that_runs(spec, description)
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
         self.shapes = _shapes(self.variables, spec.parameters)
         self.depends = _dependencies(description)
-        fmu = unpack(spec.fmu)
+        fmu = unpack(file)
         exchanges = self.kind == "model_exchange"
         self.capabilities = capabilities_of(description, fmu.folder, model_exchange=exchanges)
         self._refuse_what_it_needs()
@@ -127,7 +129,7 @@ class Component:
         self.refuses_events = self.on_own_grid = False
         self.ticking: frozenset[int] | None = None
         self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
-        self.sha256 = fmu.sha256
+        self.sha256 = fmu.sha256 if spec.server is None else spec.server.sha256
         self._take_only_instance()
         self.instance: Instance2 | Instance3 | ExchangeInstance
         if exchanges:
@@ -144,6 +146,18 @@ class Component:
         self._inputs: list[VariableGroup] = []
         self.event_times = self._event_time_group() if self._tells_events(version) else None
 
+    _make2: Callable[..., Instance2] = Instance2
+    _make3: Callable[..., Instance3] = Instance3
+
+    def _described_there(self, server: FmuServer) -> Path:
+        """Return a file with the description of an FMU elsewhere, whose instances are made there."""
+        # gRPC is imported only for FMUs elsewhere
+        from vibroimpact.orchestrator.remote.description import described_fmu
+        from vibroimpact.orchestrator.remote.instances import RemoteInstance2, RemoteInstance3
+
+        self._make2, self._make3 = partial(RemoteInstance2, server), partial(RemoteInstance3, server)
+        return described_fmu(server, self.spec.fmu)
+
     def _tells_events(self, version: int) -> bool:
         return version == 2 and self.has_states and self.kind == "co_simulation"
 
@@ -155,7 +169,7 @@ class Component:
 
     def _take_only_instance(self) -> None:
         """Register this component as the only instance of an FMU that allows one per process."""
-        if not self.capabilities.only_once:
+        if not self.capabilities.only_once or self.spec.server is not None:  # a process of its own there
             return
         other = _only_instances.get(self.sha256)
         if other is not None:
@@ -172,7 +186,7 @@ class Component:
         # a reused instance of this name would be a second one beside an instance of another name
         reuse = reuse and not self.capabilities.only_once
         try:
-            return Instance2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
+            return self._make2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
         except ComponentError as refusal:
             raise self._named_tool(refusal) from None
 
@@ -216,11 +230,11 @@ class Component:
 
     def _instance3(self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None) -> Instance3:
         """Make an instance with event mode where that is declared; some FMUs refuse the mode that they declare."""
-        make = partial(Instance3, fmu, self.name, log=log, wrap=wrap)
+        make = partial(self._make3, fmu, self.name, log=log, wrap=wrap)
         try:
             return make(event_mode=self.event_mode)
         except ComponentError as refusal:
-            if not self.event_mode:
+            if not self.event_mode or isinstance(refusal, LostComponentError):
                 raise self._named_tool(refusal) from None
             try:
                 instance = make()

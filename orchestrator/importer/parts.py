@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.component import Component
@@ -56,17 +57,24 @@ def parts_of(
 ) -> Parts:
     """Return the parts for the arguments of an `Importer`; components are instantiated."""
     watched = {event.component for event in events}
+    named: dict[str, Component] = {}
 
     def made(spec: ComponentSpec, *, events: bool) -> Component:
         tail, wrapper = log(spec.name) if log else None, wrap(spec.name) if wrap else None
         return Component(spec, log=tail, wrap=wrapper, events=events)
 
-    named = {spec.name: made(spec, events=spec.name not in watched) for spec in specs}
-    for cut in cut_components(named.values(), divisions, has_events=bool(events or contacts or pairs)):
-        if cut.event_mode:  # its events lie inside its own steps
-            cut.free()
-            named[cut.name] = made(cut.spec, events=False)
-        named[cut.name].keep_own_grid()
+    try:
+        for spec in specs:
+            named[spec.name] = made(spec, events=spec.name not in watched)
+        for cut in cut_components(named.values(), divisions, has_events=bool(events or contacts or pairs)):
+            if cut.event_mode:  # its events lie inside its own steps
+                cut.free()
+                named[cut.name] = made(cut.spec, events=False)
+            named[cut.name].keep_own_grid()
+    except ComponentError:
+        for component in named.values():
+            component.free()
+        raise
     watches = [Watch(named[event.component], event) for event in events]
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
     clocks = [c for c in connections if joins_clocks(c, named)]

@@ -260,9 +260,12 @@ class PlainLoop:
 def can_loop(components: Iterable[Component], lists: Iterable[CallList | None]) -> bool:
     """Can the calls of these lists, and the steps of these components, be made in C?
 
-    Not with functions of an FMU that are wrapped by more than notes, nor with converted values other than real
-    numbers.
+    Not with functions of an FMU that are wrapped by more than notes or called elsewhere, nor with converted values
+    other than real numbers.
     """
+    components = list(components)
+    if not all(component.instance.runs_here for component in components):
+        return False
     wraps = [component.instance.wrap for component in components]
     notes = {w.call_address if isinstance(w, CallNotes) else None for w in wraps}
     is_noted = all(w is None or isinstance(w, CallNotes) for w in wraps) and len(notes) == 1

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from vibroimpact.fmus.shipped import package_folder
+from vibroimpact.orchestrator.remote.address import FmuServer
 
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
@@ -42,6 +43,8 @@ class ComponentSpec:
         Relative tolerance of the solver: inside the FMU, or of CVODE in model exchange; None: the FMU's own.
     run_as : str
         The kind of FMU that runs: `model_exchange`, `co_simulation`, or `auto`: co-simulation where the FMU has it.
+    server : FmuServer or None
+        The server where it runs; `fmu` has its description alone. None: it runs in this process.
     """
 
     name: str
@@ -49,6 +52,7 @@ class ComponentSpec:
     parameters: Mapping[str, StartValue] = field(default_factory=dict)
     tolerance: float | None = None
     run_as: RunAs = "auto"
+    server: FmuServer | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         package = package_folder()
@@ -61,7 +65,14 @@ class ComponentSpec:
                 self.tolerance,
                 self.run_as,
             )
-        return ComponentSpec, (self.name, self.fmu, self.parameters, self.tolerance, self.run_as)
+        return ComponentSpec, (
+            self.name,
+            self.fmu,
+            self.parameters,
+            self.tolerance,
+            self.run_as,
+            self.server,
+        )
 
 
 def _shipped(name: str, place: Path, *rest: Any) -> ComponentSpec:

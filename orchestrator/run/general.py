@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.fmus.errors import ComponentError, LateComponentError, LostComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts, impact_rows
@@ -22,7 +22,7 @@ from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.own_grid import Divisions, step_remarks
 from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.importer.specification import PairSpec
-from vibroimpact.orchestrator.run.empty_record import MOST_CONTACTS, records_impacts
+from vibroimpact.orchestrator.run.empty_record import MOST_CONTACTS, empty_record, records_impacts
 from vibroimpact.orchestrator.run.record import (
     Deadline,
     DeadlineReached,
@@ -105,7 +105,7 @@ class GeneralRunner(Runner):
         self._importer.watchers.append(self._deadline.watcher)
         self._energy = InterfaceEnergy(self._importer, scene.connections)
         self._sampler = self._make_sampler(scene)
-        self._broken = False
+        self._broken = self._is_freed = False
 
     def _make_sampler(self, scene: Scene) -> Sampler | None:
         names, formed = (
@@ -116,9 +116,17 @@ class GeneralRunner(Runner):
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene does not carry states over.
 
-        ComponentError: a component fails, with its instance, function and time.
+        The loss of a component elsewhere is the outcome of the point. ComponentError: a component fails, with its
+        instance, function and time.
         """
         began = time.perf_counter()
+        try:
+            return self._run_whole(values, began)
+        except LostComponentError as loss:
+            outcome = Outcome.timeout if isinstance(loss, LateComponentError) else Outcome.crash
+            return empty_record(self.scene, outcome, str(loss), time.perf_counter() - began)
+
+    def _run_whole(self, values: Mapping[str, float], began: float) -> RunRecord:
         scene = self.scene.at(values) if values else self.scene
         if self._broken:
             self._rebuild()
@@ -135,7 +143,8 @@ class GeneralRunner(Runner):
 
     def _rebuild(self) -> None:
         """Make all components anew."""
-        self.close()
+        if not self._is_freed:
+            self.close()
         self._build()
 
     def _run(self, scene: Scene) -> tuple[Outcome, str]:
@@ -300,6 +309,7 @@ class GeneralRunner(Runner):
 
     def close(self) -> None:
         """Free the components."""
+        self._is_freed = True  # what cannot be made anew after this has nothing to be freed again
         self._energy.free()
         self._importer.free()
 

@@ -35,7 +35,8 @@ class ComponentTable(SceneTable):
         Rule(
             "a path of an FMU file, or the name of a shipped component",
             hint='For example "ball.fmu".',
-            doc="a path that ends in `.fmu`, relative to the folder of the scene file; or a shipped component: "
+            doc="a path that ends in `.fmu`, relative to the folder of the scene file; `grpc://HOST:PORT`, a server of "
+            "one FMU ([elsewhere](../fmus_elsewhere.md)); or a shipped component: "
             '`"Oscillator"`, `"Chain"`, `"Beam"`, `"Structure"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, '
             '`"LoadCell"`, `"Exciter"`, `"Noise"`, `"AnalogInput"`, in any spelling',
         ),
@@ -64,6 +65,15 @@ class ComponentTable(SceneTable):
             doc="relative tolerance of the solver inside the FMU, or of the integration in model exchange; only for an "
             "FMU from a file, or in model exchange",
             default="the FMU's own; in model exchange that of its default experiment, else 1e-8",
+        ),
+    ] = None
+    certificate: Annotated[
+        _Text | None,
+        Rule(
+            "a path of a certificate (PEM)",
+            doc="a path relative to the folder of the scene file: the certificate (PEM) that the server must show, or "
+            "that of the authority which has signed it; beside `grpc://` only",
+            default="none: no TLS, on this machine alone",
         ),
     ] = None
     run_as: Annotated[

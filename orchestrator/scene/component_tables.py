@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -100,7 +101,8 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
     assert draft.record is not None
     assert draft.execution is not None
     facts = [component.facts for component in draft.components.values() if component.facts]
-    components = tuple(_component(component, plan, axes) for component in draft.components.values())
+    deadline = None if draft.execution is None else draft.execution.deadline
+    components = tuple(_component(component, plan, axes, deadline) for component in draft.components.values())
     connections = tuple(_connection(table) for table in draft.connections if table)
     contacts = tuple(_contact(draft, plan, *each, axes) for each in enumerate(draft.contacts))
     numbers = ComponentNumbers(components, connections, contacts).numbers()
@@ -131,13 +133,18 @@ def _sample_forms(draft: GeneralDraft) -> dict[str, SampleForm]:
     return found
 
 
-def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> ComponentSpec:
+def _component(
+    component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...], deadline: float | None
+) -> ComponentSpec:
     assert component.fmu is not None
     ports = plan.parameters.get(component.name, {})
     parameters = {**_first_swept(component, axes), **(component.parameters or {}), **ports}
     facts = component.facts
     if facts is None or facts.kind != MODEL_EXCHANGE:
-        return ComponentSpec(component.name, component.fmu, parameters, component.tolerance)
+        server = component.server
+        if server is not None and deadline is not None:
+            server = replace(server, seconds=deadline)
+        return ComponentSpec(component.name, component.fmu, parameters, component.tolerance, server=server)
     tolerance = component.tolerance or facts.capabilities.tolerance
     return ComponentSpec(component.name, component.fmu, parameters, tolerance, MODEL_EXCHANGE)
 

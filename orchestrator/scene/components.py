@@ -17,6 +17,7 @@ from vibroimpact.fmus.shipped import letters_of
 from vibroimpact.orchestrator.fmi.capabilities import NEEDED_OF_CLOCKS, ONLY_ONCE
 from vibroimpact.orchestrator.fmi.shapes import Shape
 from vibroimpact.orchestrator.importer.specification import RunAs, StartValue
+from vibroimpact.orchestrator.remote.address import FmuServer
 from vibroimpact.orchestrator.scene.array_values import array_shape, given_value
 from vibroimpact.orchestrator.scene.component_facts import (
     MODEL_EXCHANGE,
@@ -45,6 +46,7 @@ from vibroimpact.orchestrator.scene.draft import DraftTables
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted, read_table
+from vibroimpact.orchestrator.scene.served_components import is_served, refuse_version, served_component
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
@@ -60,6 +62,7 @@ class DraftComponent:
     parameters: Mapping[str, StartValue] | None = None
     tolerance: float | None = None
     run_as: RunAs = "auto"
+    server: FmuServer | None = None
 
 
 def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
@@ -80,7 +83,7 @@ def _only_instances(components: Mapping[str, DraftComponent]) -> Iterator[Proble
     first: dict[str, str] = {}
     for name, component in components.items():
         facts = component.facts
-        if component.fmu is None or facts is None or not facts.capabilities.only_once:
+        if component.fmu is None or facts is None or not facts.capabilities.only_once or component.server:
             continue
         other = first.setdefault(content_hash(component.fmu), name)
         if other != name:
@@ -110,13 +113,25 @@ def _read_component(
     table = read_table(ComponentTable, raw, path, problems)
     if table is None:
         return DraftComponent(name)
-    shipped = not _is_file_name(table.fmu)
-    fmu = (
-        _shipped_fmu(table, path, package, problems) if shipped else _fmu_file(table, path, folder, problems)
-    )
+    shipped, server = not (_is_file_name(table.fmu) or is_served(table.fmu)), None
+    if is_served(table.fmu):
+        fmu, server = served_component(table, path, folder, problems)
+    elif shipped:
+        fmu = _shipped_fmu(table, path, package, problems)
+    else:
+        fmu = _fmu_file(table, path, folder, problems)
+    if table.certificate is not None and not is_served(table.fmu):
+        where, expected = (
+            key_path((*path, "certificate")),
+            "certificate beside a server grpc://HOST:PORT only",
+        )
+        problems.append(Problem(where, expected, f"certificate beside {quoted(table.fmu)}"))
     facts = _facts(fmu, table.run_as, path, problems) if fmu else None
+    if facts and server and facts.kind == MODEL_EXCHANGE:
+        where, got = key_path((*path, "run_as")), "model exchange, which is integrated where the scene runs"
+        problems.append(Problem(where, '"auto" or "co_simulation" for a served FMU', got))
     parameters = _parameters(table.parameters, path, facts, problems) if facts else None
-    return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance, table.run_as)
+    return DraftComponent(name, fmu, shipped, facts, parameters, table.tolerance, table.run_as, server)
 
 
 def _is_file_name(text: str) -> bool:
@@ -128,7 +143,7 @@ def _shipped_fmu(
 ) -> Path | None:
     where = key_path((*path, "fmu"))
     if table.fmu not in package:
-        expected = "a path that ends in .fmu, or the name of a shipped component"
+        expected = "a path that ends in .fmu, grpc://HOST:PORT, or the name of a shipped component"
         problems.append(
             Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, package.names))
         )
@@ -152,12 +167,7 @@ def _shipped_fmu(
 def _fmu_file(
     table: ComponentTable, path: tuple[str, ...], folder: Path, problems: list[Problem]
 ) -> Path | None:
-    if table.fmi is not None:
-        hint = "The file itself says which version it is: remove fmi."
-        got = f"fmi = {quoted(table.fmi)} beside a file"
-        problems.append(
-            Problem(key_path((*path, "fmi")), "fmi beside the name of a shipped component only", got, hint)
-        )
+    refuse_version(table, path, "a file", problems)
     file = (folder / table.fmu).absolute()
     where = key_path((*path, "fmu"))
     try:

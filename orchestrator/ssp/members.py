@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.description import ComponentDescription, UnitDefinition
@@ -75,6 +76,12 @@ def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
     taken: dict[str, str] = {}
     parts = {}
     for spec in scene.components:
+        if spec.server is not None:
+            raise SceneError(
+                [
+                    f"{scene.source}: component.{spec.name}.fmu: expected an FMU file to copy, got one of a server."
+                ]
+            )
         own, file = _own(spec.fmu), spec.fmu
         if own is not None:
             file = _exported(described[own[0]], spec, _used(scene, spec), travel.fmi or own[1], travel)

@@ -336,7 +336,7 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         "component.c4.fmu: expected an FMU for co-simulation or model exchange, "
         "got scheduled.fmu for scheduled execution only. ",
         "component.c5.fmu: expected an intact FMU, got an error: ",
-        "component.c6.fmu: expected a path that ends in .fmu, or the name of a shipped component, "
+        "component.c6.fmu: expected a path that ends in .fmu, grpc://HOST:PORT, or the name of a shipped component, "
         'got "Oscilator". Did you mean Oscillator?',
         "component.c7.fmi: expected fmi beside the name of a shipped component only, "
         'got fmi = "3.0" beside a file. ',
