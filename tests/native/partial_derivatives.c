@@ -1,5 +1,5 @@
 /* Partial derivatives of a random body. The equations carried back are the transposed ones, whatever its contacts do. A
- * call with random references and sizes is right, or an error with one line. */
+ * call with random references, orders and sizes is right, or an error with one line. */
 #define VI_STATES VI_STATES_OF_IMPORTER /* the core has a number of this name */
 #include "../../fmus/native/adapters/derivatives.c"
 #define is_finite is_finite_of_numbers
@@ -9,6 +9,9 @@
 #undef VI_STATES
 #define place_of_state place_of_state_of_body
 #include "../../fmus/native/bodies/body_derivatives.c"
+#define form form_of_rates
+#include "../../fmus/native/bodies/body_rates.c"
+#undef form
 
 #include "body/modal/structure/structure.h"
 #include "check.h"
@@ -86,8 +89,16 @@ static bool own_row(void *self, size_t offset, vi_line *line)
     return false;
 }
 
-const vi_body_form vi_this_body = {
-    .place = offsetof(thing, body), .show_states = show_states, .column = own_column, .row = own_row};
+static double base_forcing(const void *self)
+{
+    return ((const thing *)self)->fixed;
+}
+
+const vi_body_form vi_this_body = {.place = offsetof(thing, body),
+                                   .show_states = show_states,
+                                   .base_forcing = base_forcing,
+                                   .column = own_column,
+                                   .row = own_row};
 
 const vi_component vi_this_component = {
     .defaults = defaults, .initialize = initialize, .update_outputs = update, .partial = &vi_body_derivatives};
@@ -223,6 +234,11 @@ static void random_calls_are_errors_or_right(uint64_t *seed)
         const int before = lines;
         const vi_status status = vi_instance_derive(instance, "derive", &call);
         CHECK(lines == before + (status == VI_OK ? 0 : 1), "%d lines for one call", lines - before);
+        const int32_t orders[] = {(int32_t)choice(seed, 4), 1, 2, (int32_t)choice(seed, 3)};
+        const vi_status over_time = vi_instance_differentiate(instance, "differentiate", choice(seed, 20) == 0 ? NULL : to,
+                                                              orders, found, unknowns);
+        CHECK(lines == before + (status == VI_OK ? 0 : 1) + (over_time == VI_OK ? 0 : 1), "%d lines for two calls",
+              lines - before);
     }
     vi_instance_free(instance);
 }

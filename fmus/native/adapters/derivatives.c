@@ -97,12 +97,12 @@ static bool begin(vi_instance *instance, const char *function)
     return true;
 }
 
-static bool is_finite(vi_instance *instance, const char *function, const vi_derivative_call *call)
+static bool is_finite(vi_instance *instance, const char *function, const double values[], size_t count)
 {
     const vi_model_exchange *exchange = vi_this_component.exchange;
     bool finite = exchange == NULL || exchange->states == NULL || exchange->states_are_finite(instance->self);
-    for (size_t i = 0; i < call->sensitivity_count; ++i) {
-        finite = finite && isfinite(call->sensitivity[i]);
+    for (size_t i = 0; i < count; ++i) {
+        finite = finite && isfinite(values[i]);
     }
     if (!finite) {
         vi_instance_warn(instance, function, "expected finite states, seeds and derivatives, got others");
@@ -110,7 +110,7 @@ static bool is_finite(vi_instance *instance, const char *function, const vi_deri
     return finite;
 }
 
-/* ---- the call ---- */
+/* ---- over other variables ---- */
 
 vi_status vi_instance_derive(vi_instance *instance, const char *function, const vi_derivative_call *call)
 {
@@ -145,5 +145,66 @@ vi_status vi_instance_derive(vi_instance *instance, const char *function, const 
         }
         call->sensitivity[i] = read(&line, &change);
     }
-    return is_finite(instance, function, call) ? VI_OK : VI_DISCARD;
+    return is_finite(instance, function, call->sensitivity, call->sensitivity_count) ? VI_OK : VI_DISCARD;
+}
+
+/* ---- over time ---- */
+
+/* Find the carried changes up to an order, `known` of which are; false after logging. */
+static bool find_rates(vi_instance *instance, const char *function, int order, vi_variation rate[], int *known)
+{
+    const vi_partial_derivatives *partial = vi_this_component.partial;
+    for (; *known < order; ++*known) {
+        vi_variation *change = &rate[*known];
+        memset(change, 0, sizeof *change);
+        const char *reason = partial->rate != NULL ? partial->rate(instance->self, *known + 1, rate, change) : NULL;
+        if (reason != NULL) {
+            return vi_instance_fail(instance, function, "expected a motion with derivatives over time, got %s", reason);
+        }
+        if (partial->carry != NULL) {
+            partial->carry(instance->self, change);
+        }
+    }
+    return true;
+}
+
+vi_status vi_instance_differentiate(vi_instance *instance, const char *function, const uint32_t references[],
+                                    const int32_t orders[], double values[], size_t count)
+{
+    const vi_partial_derivatives *partial = vi_this_component.partial;
+    vi_variation rate[VI_MOST_ORDER];
+    int known = 0;
+    vi_line line;
+    if (instance != NULL && partial == NULL && count > 0) {
+        vi_instance_fail(instance, function, "not available in this component");
+        return VI_ERROR;
+    }
+    if (instance == NULL || !vi_instance_expect_steps(instance, function)
+        || !vi_instance_expect(instance, function, VI_RUNNING | VI_MODE_TERMINATED)) {
+        return VI_ERROR;
+    }
+    if (count > 0 && (references == NULL || orders == NULL || values == NULL)) {
+        vi_instance_fail(instance, function, "expected value references, orders and room for values, got null");
+        return VI_ERROR;
+    }
+    if (count > 0 && partial->begin != NULL) {
+        partial->begin(instance->self);
+    }
+    const end_of_map unknown = {"output", references, count, count > 0 ? partial->row : NULL};
+    for (size_t i = 0; i < count; ++i) {
+        const int order = orders[i];
+        if (order < 1 || order > VI_MOST_ORDER) {
+            vi_instance_fail(instance, function, "expected an order from 1 to %d, got %ld", VI_MOST_ORDER, (long)order);
+            return VI_ERROR;
+        }
+        if (!find_line(instance, function, &unknown, references[i], &line)
+            || !find_rates(instance, function, order, rate, &known)) {
+            return VI_ERROR;
+        }
+        const vi_variable *variable = vi_instance_find(instance, function, VI_FLOAT64, references[i]);
+        const uint32_t own = (uint32_t)(variable - vi_this_description.variables);
+        values[i] = read(&line, &rate[order - 1]);
+        values[i] += order == 2 && partial->bend != NULL ? partial->bend(instance->self, own) : 0.0;
+    }
+    return is_finite(instance, function, values, count) ? VI_OK : VI_DISCARD;
 }

@@ -1,4 +1,4 @@
-/* Partial derivatives of an instance at the present instant, for both versions of FMI. Refused calls are logged. */
+/* Derivatives of an instance at the present instant, over other variables and over time, for both versions of FMI. Refused calls are logged. */
 #ifndef VIBROIMPACT_DERIVATIVES_H
 #define VIBROIMPACT_DERIVATIVES_H
 
@@ -18,5 +18,9 @@ typedef struct {
 
 /* Compute the sensitivities. VI_DISCARD: states or derivatives are not finite. */
 vi_status vi_instance_derive(vi_instance *instance, const char *function, const vi_derivative_call *call);
+
+/* Compute derivatives over time of these orders at a communication point, while inputs keep their slopes. */
+vi_status vi_instance_differentiate(vi_instance *instance, const char *function, const uint32_t references[],
+                                    const int32_t orders[], double values[], size_t count);
 
 #endif

@@ -301,7 +301,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[])
 {
-    return nvr == 0 ? fmi2OK : unavailable(c, "fmi2GetRealOutputDerivatives");
+    return (fmi2Status)vi_instance_differentiate(c, "fmi2GetRealOutputDerivatives", vr, order, value, nvr);
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,

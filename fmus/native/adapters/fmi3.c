@@ -345,7 +345,7 @@ SETTER(Int64, fmi3Int64, VI_INT64, write_int64)
 GETTER(Boolean, fmi3Boolean, VI_BOOLEAN, read_boolean)
 SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
 
-/* ---- partial derivatives ---- */
+/* ---- derivatives ---- */
 
 #define DERIVATIVE(NAME, ADJOINT)                                                                                    \
     fmi3Status fmi3Get##NAME##Derivative(fmi3Instance instance, const fmi3ValueReference unknowns[],                 \
@@ -360,6 +360,18 @@ SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
 
 DERIVATIVE(Directional, false)
 DERIVATIVE(Adjoint, true)
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
+                                    size_t nValues)
+{
+    static const char function[] = "fmi3GetOutputDerivatives";
+    if (instance != NULL && nValues != nValueReferences) {
+        return status(vi_instance_fail(instance, function, "expected room for %lu values, got %lu",
+                                       (unsigned long)nValueReferences, (unsigned long)nValues));
+    }
+    return (fmi3Status)vi_instance_differentiate(instance, function, valueReferences, orders, values, nValues);
+}
 
 /* ---- saved states ---- */
 

@@ -63,7 +63,7 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
 }
 
-/* ---- scheduled execution, clocks, output derivatives ---- */
+/* ---- scheduled execution, clocks ---- */
 
 #define UNAVAILABLE(NAME, ...)               \
     fmi3Status NAME(__VA_ARGS__)             \
@@ -95,7 +95,5 @@ UNAVAILABLE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference
             size_t nValueReferences, const fmi3Float64 shifts[])
 UNAVAILABLE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
             size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNAVAILABLE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference valueReferences[],
-            size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 UNAVAILABLE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,
             fmi3Float64 activationTime)

@@ -6,6 +6,7 @@
 #include "body.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body_rates.h"
 #include "contact/complementarity.h"
 
 static const vi_body_form *const form = &vi_this_body;
@@ -375,4 +376,6 @@ const vi_partial_derivatives vi_body_derivatives = {
     .row = row,
     .carry = carry,
     .carry_back = carry_back,
+    .rate = vi_body_rate,
+    .bend = vi_body_bend,
 };

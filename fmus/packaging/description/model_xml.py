@@ -24,6 +24,8 @@ LOG_CATEGORIES = {
     "logStatusWarning": "What is unusual but was dealt with",
     "logEvents": "Contacts, sticking and release, as they happen",
 }
+#: Highest order of the derivatives over time of outputs in co-simulation; VI_MOST_ORDER of component.h.
+MOST_OUTPUT_DERIVATIVES = 2
 FMI2_TYPES = {"Float64": "Real", "Int64": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 
 
@@ -117,6 +119,8 @@ def _capabilities(component: ComponentDescription, version: int, kind: str) -> d
     if kind == "ModelExchange":
         without = "completedIntegratorStepNotNeeded" if version == 2 else "needsCompletedIntegratorStep"
         return {**common, without: literal(version == 2)}
+    if component.partial_derivatives:
+        common["maxOutputDerivativeOrder"] = str(MOST_OUTPUT_DERIVATIVES)
     if version == 2:
         return {**common, "canHandleVariableCommunicationStepSize": "true"}
     events = literal(component.event_mode)
