@@ -35,6 +35,7 @@ MODELS = {
     "StatelessMass": "stateless_mass.c",
     "SteppedBall": "stepped_ball.c",
     "Timed": "timed.c",
+    "UpdatingMass": "updating_mass.c",
 }
 #: First letters of the C files of a model's adapters, without the version.
 ADAPTERS = {"Exchanged": "exchange"}
@@ -142,6 +143,11 @@ def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
     `inner_step`: the integration method.
     """
     return _write("Mass" if states else "StatelessMass", fmi, folder)
+
+
+def updating_mass(folder: Path) -> Path:
+    """Write the mass in FMI 3.0 that calls back within its steps, and refuses a step without a callback."""
+    return _write("UpdatingMass", "3.0", folder)
 
 
 def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
