@@ -61,6 +61,7 @@ ONLY_ONCE = "canBeInstantiatedOnlyOncePerProcess"
 NEEDS_TOOL = "needsExecutionTool"
 ASYNCHRONOUS = "canRunAsynchronuously"
 EVENT_MODE = "hasEventMode"
+SET_ONCE = "canHandleMultipleSetPerTimeInstant"
 #: Clocks of an FMU that runs, in words.
 NEEDED_OF_CLOCKS = "clocks as FMI defines them, in an FMU that has an event mode"
 _COMMON = (NEEDS_TOOL, ONLY_ONCE)
@@ -95,7 +96,7 @@ FLAGS: tuple[Flag, ...] = (
         "3.0",
         "where a step has ended is taken from the FMU, whatever it says here",
     ),
-    *_refused(CO_SIMULATION, "a step that returns pending is refused by this name", "2.0", ASYNCHRONOUS),
+    _heeded(ASYNCHRONOUS, "2.0", "true: a step that returns pending is waited for; false: it is an error"),
     _heeded("canInterpolateInputs", "2.0", _NEVER),
     _heeded("maxOutputDerivativeOrder", "2.0, 3.0", _NEVER),
     _heeded("canSerializeFMUstate", "2.0", _NEVER),
@@ -105,8 +106,12 @@ FLAGS: tuple[Flag, ...] = (
     _heeded("providesAdjointDerivatives", "3.0", _NEVER),
     _heeded("providesPerElementDependencies", "3.0", _NEVER),
     _heeded("providesEvaluateDiscreteStates", "3.0", _NEVER),
-    _heeded("providesIntermediateUpdate", "3.0", "no callback is given, and no variable asked for"),
-    _heeded("canReturnEarlyAfterIntermediateUpdate", "3.0", "no callback is given that could ask for it"),
+    _heeded(
+        "providesIntermediateUpdate",
+        "3.0",
+        "true: a callback is given, and no variable asked for; false: none is given",
+    ),
+    _heeded("canReturnEarlyAfterIntermediateUpdate", "3.0", "the callback asks for no early return"),
     _heeded("recommendedIntermediateInputSmoothness", "3.0", "no input is given within a step"),
     *(
         _heeded(name, versions, how, MODEL_EXCHANGE)
@@ -146,9 +151,7 @@ FLAGS: tuple[Flag, ...] = (
         "providesAdjointDerivatives",
         "providesPerElementDependencies",
     ),
-    *_refused(
-        VARIABLE, "it speaks of model exchange alone", "2.0, 3.0", "canHandleMultipleSetPerTimeInstant"
-    ),
+    _heeded(SET_ONCE, "2.0, 3.0", "false: the input is refused in an algebraic loop, by this name", VARIABLE),
     _heeded(
         "intervalVariability",
         "3.0",
@@ -181,6 +184,10 @@ class Capabilities:
         The required tool; empty without one.
     asynchronous : bool
         Its step calls may return before the step is done.
+    updates : bool
+        It calls back within its steps if it gets a callback.
+    set_once : frozenset of int
+        FMI 2.0, model exchange: value references of the inputs that are set once at an instant.
     clocks : tuple of Clock
         Its clocks that can tick.
     refusals : tuple of str
@@ -196,6 +203,8 @@ class Capabilities:
     only_once: bool = False
     tool: str = ""
     asynchronous: bool = False
+    updates: bool = False
+    set_once: frozenset[int] = frozenset()
     clocks: tuple[Clock, ...] = ()
     refusals: tuple[str, ...] = ()
     tolerance: float = DEFAULT_TOLERANCE
@@ -240,6 +249,7 @@ def capabilities_of(
         only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
         tool=_tool(description) if interface.needsExecutionTool else "",
         asynchronous=bool(interface.canRunAsynchronuously),
+        updates=bool(interface.providesIntermediateUpdate),
         clocks=clocks,
         refusals=refusals,
     )
@@ -270,10 +280,18 @@ def _of_model_exchange(description: ModelDescription, folder: Path) -> Capabilit
         event_mode=True,
         only_once=bool(interface.canBeInstantiatedOnlyOncePerProcess),
         tool=_tool(description) if interface.needsExecutionTool else "",
+        set_once=_set_once(folder),
         clocks=clocks,
         refusals=refusals,
         tolerance=_usual_tolerance(description),
     )
+
+
+def _set_once(folder: Path) -> frozenset[int]:
+    """Return the inputs that take one value at an instant; FMPy does not read their flag."""
+    root = root_of((folder / "modelDescription.xml").read_bytes(), "modelDescription.xml")
+    variables = root.iterfind("ModelVariables/*")
+    return frozenset(int(v.get("valueReference", "")) for v in variables if v.get(SET_ONCE) in ("false", "0"))
 
 
 def _usual_tolerance(description: ModelDescription) -> float:

@@ -151,7 +151,7 @@ class Instance(ABC):
             self.is_fatal = self.is_fatal or status == FATAL
             word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
             if status == PENDING:
-                word += ", a step that goes on by itself (canRunAsynchronuously), which no importer here waits for,"
+                word += ", a step that goes on by itself, without canRunAsynchronuously,"
             self.fail(function, f"returned {word} at time {self.time:.17g}")
 
     def fail(self, function: str, what: str, kind: type[ComponentError] = ComponentError) -> NoReturn:

@@ -6,6 +6,7 @@ import ctypes
 import math
 from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
+from time import sleep
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
@@ -13,6 +14,7 @@ from vibroimpact.orchestrator.fmi.instance import (
     DISCARD,
     NO_STATE_PRIOR_TO_POINT,
     OK,
+    PENDING,
     WARNING,
     Instance,
     Wrapper,
@@ -23,7 +25,9 @@ from vibroimpact.orchestrator.fmi.variables import FMI2_NAMES
 
 CO_SIMULATION = 1
 #: Kinds of status.
-LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
+DO_STEP, LAST_SUCCESSFUL_TIME, TERMINATED = 0, 2, 3
+#: Wall time between two questions whether a step that goes on by itself has ended, s.
+PENDING_PAUSE = 1e-4
 
 
 #: Callbacks of the core library, up to the first that is not given.
@@ -51,6 +55,8 @@ class Instance2(Instance):
 
     Parameters
     ----------
+    waits : bool
+        A step may go on by itself (`canRunAsynchronuously`): its end is waited for.
     reuse : bool
         Keep the FMU's instance when this one is freed, and reset it for the next instance of this name. It is for FMUs
         that leak memory at each instantiation.
@@ -69,9 +75,11 @@ class Instance2(Instance):
         *,
         log: LogTail | None = None,
         wrap: Wrapper | None = None,
+        waits: bool = False,
         reuse: bool = False,
     ) -> None:
         super().__init__(fmu, name, log=log, wrap=wrap)
+        self._waits = waits
         self._reuse = reuse
         self._callbacks = Callbacks(*map(callback, FMI2_CALLBACKS), None, self.log.environment)
         if not self._take_kept():
@@ -130,6 +138,8 @@ class Instance2(Instance):
     def take_step(self, status: int) -> int:
         """Read status and flags of the step just made; returns as `step` does."""
         end = self._step_time.value + self._step_size.value
+        if status == PENDING and self._waits:
+            status = self._awaited()
         if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
             self._keep_rounding()
         self.wants_to_end = self.is_flagged = False
@@ -143,6 +153,16 @@ class Instance2(Instance):
             return OK
         self.time = end
         return status
+
+    def _awaited(self) -> int:
+        """Wait for the end of a step that goes on by itself; return its status."""
+        ask, found = self._function("GetStatus"), c_int(PENDING)
+        while found.value == PENDING:
+            sleep(PENDING_PAUSE)
+            status = ask(self._pointer, c_int(DO_STEP), ctypes.byref(found))
+            if status != DISCARD:  # a question without an answer
+                self.check(status, "GetStatus")
+        return found.value
 
     def take_time(self, time: float) -> None:
         """Set the time, s, that steps made and checked by C code have reached."""

@@ -20,6 +20,8 @@ class Instance3(ClockedInstance):
         Handle events: event mode and early return.
     early_return : bool
         Let the FMU end a step early (always so in event mode).
+    updates : bool
+        The FMU may call back within a step. The callback is in C; it asks for nothing.
     """
 
     fmi_version = "3.0"
@@ -33,12 +35,14 @@ class Instance3(ClockedInstance):
         *,
         event_mode: bool = False,
         early_return: bool = False,
+        updates: bool = False,
         log: LogTail | None = None,
         wrap: Wrapper | None = None,
     ) -> None:
         super().__init__(fmu, name, log=log, wrap=wrap)
         self.event_mode = event_mode
         self.may_return_early = early_return or event_mode
+        self._update = callback("update") if updates else c_void_p()
         self._instantiate()
         self._keep_rounding()
         self._bind_life()
@@ -51,7 +55,7 @@ class Instance3(ClockedInstance):
         texts = (c_char_p(t.encode()) for t in (self.name, self.fmu.token, f"{self.fmu.resources}/"))
         no_variables = (c_void_p(), c_size_t(0))
         pointer = instantiate(
-            *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), c_void_p()
+            *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), self._update
         )
         if not pointer:
             self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}", ComponentFileError)

@@ -59,6 +59,6 @@ class LogTail:
 
 
 def callback(name: str) -> ctypes.c_void_p:
-    """Return the address of one of the core library's callbacks: `fmi2`, `fmi3`, `allocate`, `free`."""
+    """Return the address of one of the core library's callbacks: `fmi2`, `fmi3`, `allocate`, `free`, `update`."""
     function = getattr(core_library(), f"vi_log_ring_{name}")
     return ctypes.cast(function, ctypes.c_void_p)

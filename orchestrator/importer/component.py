@@ -186,7 +186,8 @@ class Component:
         # a reused instance of this name would be a second one beside an instance of another name
         reuse = reuse and not self.capabilities.only_once
         try:
-            return self._make2(fmu, self.name, log=log, wrap=wrap, reuse=reuse)
+            waits = self.capabilities.asynchronous
+            return self._make2(fmu, self.name, log=log, wrap=wrap, waits=waits, reuse=reuse)
         except ComponentError as refusal:
             raise self._named_tool(refusal) from None
 
@@ -230,7 +231,7 @@ class Component:
 
     def _instance3(self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None) -> Instance3:
         """Make an instance with event mode where that is declared; some FMUs refuse the mode that they declare."""
-        make = partial(self._make3, fmu, self.name, log=log, wrap=wrap)
+        make = partial(self._make3, fmu, self.name, updates=self.capabilities.updates, log=log, wrap=wrap)
         try:
             return make(event_mode=self.event_mode)
         except ComponentError as refusal:

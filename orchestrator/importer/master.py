@@ -112,11 +112,10 @@ class Importer:
             components, connections, events, contacts, pairs, divisions, contact_steps, log, wrap
         )
         self.components, self._order = parts.named, parts.components
-        self.macro_step = macro_step
         self.watches, self.contacts = parts.watches, parts.contacts
         self.transfers, self.loops = parts.transfers, parts.loops
         self.tuning, self.ticks, self.grids = parts.tuning, parts.ticks, parts.grids
-        self._progress = Progress()
+        self.macro_step, self._progress = macro_step, Progress()
         self._plan = StepPlan(parts, exchange, self._progress)
         self.watchers: list[StepWatcher] = []
         self.keeps_start = False

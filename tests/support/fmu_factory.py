@@ -36,6 +36,7 @@ MODELS = {
     "SteppedBall": "stepped_ball.c",
     "Timed": "timed.c",
     "Typed": "typed.c",
+    "UpdatingMass": "updating_mass.c",
 }
 WEAK = "__attribute__((weak))"
 #: First letters of the C files of a model's adapters, without the version.
@@ -153,6 +154,11 @@ def typed(folder: Path, fmi: str = "3.0") -> Path:
     for arrays. `word`, `big` and `mode` change with each step.
     """
     return _write("Typed", fmi, folder)
+
+
+def updating_mass(folder: Path) -> Path:
+    """Write the mass in FMI 3.0 that calls back within its steps, and refuses a step without a callback."""
+    return _write("UpdatingMass", "3.0", folder)
 
 
 def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:

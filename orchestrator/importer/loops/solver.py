@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.capabilities import SET_ONCE
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.feedthrough import (
     Graph,
@@ -165,6 +167,18 @@ class LoopSolver:
             loop for loop, _ in self._steps if any(link.connection.target in partly for link in loop.links)
         ]
         self.names = tuple(loop.name for loop, _ in self._steps)
+        self._refuse_inputs_set_once()
+
+    def _refuse_inputs_set_once(self) -> None:
+        """Raise ComponentError if an input in a loop of steps takes one value at an instant."""
+        for name, variable in self._step_targets:
+            component = self._components[name]
+            if component.variables[variable].valueReference in component.capabilities.set_once:
+                raise ComponentError(
+                    f"{name}.{variable}: expected an input that may be set more than once at an instant, as it is in "
+                    f"an algebraic loop, got one with {SET_ONCE} = false.",
+                    instance=name,
+                )
 
     def _joined(self, graph: Graph) -> Graph:
         return {i: before | self._measured.get(i, set()) for i, before in graph.items()}

@@ -17,6 +17,8 @@ typedef struct {
     double no_going_before; /* the importer has said that it goes back to no state of a time before, s */
     fmi2CallbackFunctions callbacks;
     bool terminated;
+    int pending; /* questions until a step that goes on by itself has ended */
+    double goal; /* its end, s */
     char name[64];
 } instance2;
 
@@ -36,6 +38,9 @@ void say(void *instance, const char *word, int number, double value)
 
 static fmi2Status at(fmi2Component c, occasion where)
 {
+    if (of(c)->pending > 0) {
+        return fmi2Error; /* the step still goes on */
+    }
     switch (model_at(&of(c)->m, where, c)) {
     case STEP_DONE:
         return fmi2OK;
@@ -287,10 +292,21 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 
 /* ---- steps ---- */
 
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *status_of_step)
+{
+    instance2 *i = of(c);
+    if (kind != fmi2DoStepStatus || i->pending == 0) {
+        return fmi2Error;
+    }
+    i->m.time = --i->pending == 0 ? i->goal : i->m.time;
+    *status_of_step = i->pending == 0 ? fmi2OK : fmi2Pending;
+    return fmi2OK;
+}
+
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_state_before)
 {
     model *m = &of(c)->m;
-    if (fabs(time - m->time) > TIME_TOLERANCE * (1.0 + fabs(time)) || !(size > 0.0)) {
+    if (of(c)->pending > 0 || fabs(time - m->time) > TIME_TOLERANCE * (1.0 + fabs(time)) || !(size > 0.0)) {
         say(c, "wrong communication point or step size", 0, time);
         return fmi2Error;
     }
@@ -309,6 +325,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     case STEP_FATAL:
         return fmi2Fatal;
     case STEP_PENDS:
+        of(c)->pending = 3;
+        of(c)->goal = time + size;
         return fmi2Pending;
     case STEP_STALLS:
         return fmi2Discard;

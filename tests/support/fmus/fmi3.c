@@ -18,6 +18,7 @@ typedef struct {
     double no_going_before; /* the importer has said that it goes back to no state of a time before, s */
     bool event_mode_used;
     bool in_event_mode;
+    fmi3IntermediateUpdateCallback update;
     fmi3LogMessageCallback log;
     fmi3InstanceEnvironment environment;
 } instance3;
@@ -51,6 +52,19 @@ static fmi3Status at(fmi3Instance c, occasion where)
     }
 }
 
+__attribute__((weak)) bool model_updates = false; /* a constant would be folded */
+
+/* Call back in the middle of a step; true: the importer asks for its end there. */
+static bool is_stopped(fmi3Instance c, double time, double size)
+{
+    fmi3Boolean early = true;
+    double end = time;
+    if (model_updates) {
+        of(c)->update(of(c)->environment, time + 0.5 * size, true, true, true, true, &early, &end);
+    }
+    return model_updates && early;
+}
+
 static fmi3Status status(bool good)
 {
     return good ? fmi3OK : fmi3Error;
@@ -76,14 +90,15 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3IntermediateUpdateCallback update)
 {
     (void)name, (void)resources, (void)visible, (void)logging, (void)intermediate;
-    const bool wants_intermediate_updates = update != NULL || intermediate_count > 0;
-    if (is_wrong(token) || wants_intermediate_updates || (event_mode_used && !model_has_event_mode)) {
+    const bool is_asked = (update != NULL && !model_updates) || intermediate_count > 0;
+    if (is_wrong(token) || is_asked || (event_mode_used && !model_has_event_mode)) {
         return NULL;
     }
     instance3 *i = calloc(1, sizeof *i);
     if (i != NULL) {
         i->event_mode_used = event_mode_used;
         i->log = log;
+        i->update = update;
         i->environment = environment;
         model_start(&i->m);
         i->m.early_allowed = event_mode_used && early_return;
@@ -304,6 +319,16 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
         memcpy(m->value, of(c)->before.value, sizeof m->value); /* the last step is not accepted */
     } else if (no_state_before) {
         of(c)->no_going_before = time;
+    }
+    if (model_updates && of(c)->update == NULL) {
+        say(c, "no callback for intermediate updates", 0, time);
+        return fmi3Error;
+    }
+    if (is_stopped(c, time, size)) {
+        *needs_event = *terminates = false;
+        *early = true;
+        *last_time = time;
+        return fmi3OK;
     }
     m->time = time;
     of(c)->before = *m;

@@ -54,6 +54,7 @@ typedef enum {
 
 extern const bool model_has_state;      /* get, set and serialize state */
 extern const bool model_has_event_mode; /* FMI 3.0 */
+extern bool model_updates;              /* FMI 3.0: calls back within each step; false unless the model has it */
 
 void model_start(model *m);
 /* False: the parameters are refused. */

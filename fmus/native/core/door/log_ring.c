@@ -44,3 +44,15 @@ void vi_log_ring_free(void *memory)
 {
     free(memory);
 }
+
+void vi_log_ring_update(void *environment, double time, bool wants_values, bool gives_values, bool is_final,
+                        bool can_return_early, bool *return_early, double *return_time)
+{
+    (void)environment, (void)wants_values, (void)gives_values, (void)is_final, (void)can_return_early;
+    if (return_early != NULL) {
+        *return_early = false;
+    }
+    if (return_time != NULL) {
+        *return_time = time;
+    }
+}

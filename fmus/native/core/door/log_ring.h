@@ -6,6 +6,7 @@
 #ifndef VIBROIMPACT_LOG_RING_H
 #define VIBROIMPACT_LOG_RING_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -28,5 +29,9 @@ VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int statu
 /* fmi2CallbackAllocateMemory and fmi2CallbackFreeMemory. */
 VI_DOOR void *vi_log_ring_allocate(size_t count, size_t size);
 VI_DOOR void vi_log_ring_free(void *memory);
+
+/* Intermediate update of FMI 3.0: values are neither set nor read there, and the step goes on to its end. */
+VI_DOOR void vi_log_ring_update(void *environment, double time, bool wants_values, bool gives_values, bool is_final,
+                                bool can_return_early, bool *return_early, double *return_time);
 
 #endif

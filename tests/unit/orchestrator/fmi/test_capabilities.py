@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy.fmi3 import FMU3Slave
 from support import fmu_factory
 from support.coupled_parts import link, part, values
 from support.fmu_factory import redescribed
@@ -300,19 +299,26 @@ def test_memory_functions_are_given_to_every_fmu(folder: Path, monkeypatch: pyte
     "canReturnEarlyAfterIntermediateUpdate",
     "recommendedIntermediateInputSmoothness",
 )
-def test_no_intermediate_update_is_asked_for(folder: Path) -> None:
-    offers = (
-        'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" '
-        'recommendedIntermediateInputSmoothness="1" hasEventMode'
-    )
-    samples = mass_samples(folder, described(folder, "Mass.fmi3.fmu", ("hasEventMode", offers)))
-    np.testing.assert_allclose(samples[:, 1:], exact(samples), atol=1e-12)
-    fmu = unpack(folder / "Mass.fmi3.fmu")
-    slave = FMU3Slave(
-        guid=fmu.token, unzipDirectory=str(fmu.folder), modelIdentifier="Mass", instanceName="m"
-    )
-    with pytest.raises(Exception, match="instantiate"):
-        slave.instantiate(intermediateUpdate=lambda *_: None)
+@pytest.mark.parametrize("steps_in_c", [True, False])
+def test_an_fmu_that_calls_back_within_steps_gets_a_callback_that_asks_for_nothing(
+    folder: Path, steps_in_c: bool
+) -> None:
+    # it ends its step where the callback leaves its answers as they are, and refuses a step without one
+    fmu = fmu_factory.updating_mass(folder)
+    silent = described(folder, fmu.name, ('providesIntermediateUpdate="true"', ""))
+    importer = Importer([part("m", fmu, v=1.0, k=4.0)], macro_step=0.01)
+    importer.steps_in_c = steps_in_c
+    importer.begin()
+    importer.advance(0.4)
+    assert values(importer, "m", "x")[0] == pytest.approx(0.5 * np.sin(0.8), abs=1e-12)
+    importer.free()
+    without = Importer([part("m", folder / silent)], macro_step=0.01)
+    without.begin()
+    with pytest.raises(ComponentError, match="no callback for intermediate updates"):
+        without.advance(0.4)
+    without.free()
+    with pytest.raises(ComponentError, match="made no instance"):  # an FMU without updates gets none
+        Instance3(unpack(folder / "Mass.fmi3.fmu"), "m", updates=True)
 
 
 # ---- heeded: what is offered and never used ----
@@ -350,17 +356,30 @@ def test_what_is_offered_and_not_needed_is_not_called(folder: Path, fmi: str, fl
     instance.free()
 
 
-# ---- refused ----
+# ---- heeded: steps that go on by themselves ----
 
 
-def test_a_step_that_goes_on_by_itself_is_refused_by_the_name_of_its_flag(folder: Path) -> None:
+@punishes("canRunAsynchronuously")
+@pytest.mark.parametrize("steps_in_c", [True, False])
+def test_a_step_that_goes_on_by_itself_is_waited_for(folder: Path, steps_in_c: bool) -> None:
     flag = ("<CoSimulation ", '<CoSimulation canRunAsynchronuously="true" ')
     fmu = folder / described(folder, "Faulty.fmi2.fmu", flag)
     importer = Importer([part("a", fmu, fault="pending", fault_time=0.35)], macro_step=0.1)
+    importer.steps_in_c = steps_in_c
     importer.begin()
-    with pytest.raises(ComponentError, match=r"fmi2DoStep returned pending, .*\(canRunAsynchronuously\)"):
-        importer.advance(1.0)
+    importer.advance(1.0)  # until its end the FMU refuses all other calls
+    assert values(importer, "a", "y")[0] == pytest.approx(1.0)
     importer.free()
+    silent = Importer(
+        [part("a", folder / "Faulty.fmi2.fmu", fault="pending", fault_time=0.35)], macro_step=0.1
+    )
+    silent.begin()
+    with pytest.raises(ComponentError, match=r"fmi2DoStep returned pending, .*without canRunAsynchronuously"):
+        silent.advance(1.0)
+    silent.free()
+
+
+# ---- refused ----
 
 
 DISCRETE = 'variability="discrete"'
@@ -411,6 +430,35 @@ def test_completed_steps_are_told_only_where_the_fmu_wants_them(folder: Path, fm
         importer.free()
     assert told[0] == 0.0
     assert told[1] >= 10.0
+
+
+@punishes("canBeInstantiatedOnlyOncePerProcess", "needsExecutionTool")
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_model_exchange_has_the_limits_of_instances_too(folder: Path, fmi: str) -> None:
+    flags = 'canBeInstantiatedOnlyOncePerProcess="true" needsExecutionTool="true"'
+    exchanged = fmu_factory.exchanged(folder, fmi)
+    once = redescribed(exchanged, folder / f"once{fmi[0]}.fmu", ("<ModelExchange", f"<ModelExchange {flags}"))
+    with pytest.raises(ComponentError, match=r"b: expected the only instance of .*OnlyOncePerProcess"):
+        Importer([part("a", once), part("b", once)])
+    token = "instantiationToken" if fmi == "3.0" else "guid"
+    wrong = redescribed(once, folder / f"wrong{fmi[0]}.fmu", (f'{token}="{{', f'{token}="{{0'))
+    with pytest.raises(ComponentError, match=r"It needs Exchanged on this machine \(needsExecutionTool\)"):
+        Importer([part("a", wrong)])
+
+
+@punishes("canHandleMultipleSetPerTimeInstant")
+def test_an_input_that_is_set_once_at_an_instant_is_refused_in_a_loop(folder: Path) -> None:
+    once = 'valueReference="3" canHandleMultipleSetPerTimeInstant="false"'
+    exchanged = fmu_factory.exchanged(folder, "2.0")
+    fmu = redescribed(exchanged, folder / "setonce.fmu", ('valueReference="3"', once))
+    gain = part("g", fmu_factory.gain(folder), k=0.5)
+    Importer([part("m", fmu), gain], [link("g.y", "m.u")], macro_step=0.1).free()  # no loop
+    loop = [link("g.y", "m.u"), link("m.x", "g.u")]
+    lists = redescribed(fmu, folder / "loop.fmu", ('index="1" dependencies=""', 'index="1" dependencies="3"'))
+    with pytest.raises(
+        ComponentError, match=r"m.u: expected an input .*canHandleMultipleSetPerTimeInstant = false"
+    ):
+        Importer([part("m", lists), gain], loop, macro_step=0.1)
 
 
 # ---- heeded: clocks ----

@@ -1,0 +1,6 @@
+/* The mass that calls back within each step. */
+#include "model.h"
+
+bool model_updates = true;
+
+#include "mass.c"
