@@ -204,7 +204,8 @@ def _read(
 ) -> tuple[dict[str, Any], list[str]]:
     structure = read_structure(archive)
     if structure.stop_time is None:
-        structure = replace(structure, stop_time=end)
+        start = structure.start_time or 0.0
+        structure = replace(structure, stop_time=None if end is None else start + end)
     each = dict(components_of(structure.system))
     if not each:
         raise RefusalError(SSD_FILE, "a system with components", "none")
