@@ -60,7 +60,7 @@ class Instance3(EventfulInstance):
             *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), c_void_p()
         )
         if not pointer:
-            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}", ComponentFileError)
+            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.shown}", ComponentFileError)
         self._pointer.value = pointer
 
     def set_clocks(self, references: Sequence[int]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
+from vibroimpact.fmus.packaging.archive import UnpackedFmu, shown_name, unpack
 from vibroimpact.orchestrator.fmi.capabilities import NEEDS_TOOL, ONLY_ONCE, capabilities_of
 from vibroimpact.orchestrator.fmi.exchange import (
     Exchange2,
@@ -145,7 +145,7 @@ class Component:
         if self.capabilities.refusals:
             got = " and ".join(self.capabilities.refusals)
             raise ComponentFileError(
-                f"{self.spec.fmu}: expected input clocks of a constant or fixed interval alone, got {got}."
+                f"{shown_name(self.spec.fmu)}: expected input clocks of a constant or fixed interval alone, got {got}."
             )
 
     def _take_only_instance(self) -> None:
@@ -403,7 +403,7 @@ def kind_that_runs(spec: ComponentSpec, description: ModelDescription) -> Kind:
         return kinds[0] if spec.run_as == "auto" else spec.run_as
     wanted = "co-simulation or model exchange" if spec.run_as == "auto" else spec.run_as.replace("_", "-")
     got = "scheduled execution" if not kinds else kinds[0].replace("_", "-")
-    raise ComponentFileError(f"{spec.fmu}: expected an FMU with {wanted}, got {got} only.")
+    raise ComponentFileError(f"{shown_name(spec.fmu)}: expected an FMU with {wanted}, got {got} only.")
 
 
 def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeFacts:
