@@ -192,12 +192,16 @@ def _shown(part: Part, scene: Scene, ssp: str) -> list[VariableFacts]:
     recorded = (component_variable(reference) for reference in scene.sampled)
     for component, name in recorded:
         variable = part.facts.variables.get(name) if component == part.name else None
-        if variable is not None and variable.causality in KINDS[ssp] and variable.kind in NUMERIC_KINDS:
+        is_number = variable is not None and variable.scalar and variable.kind in NUMERIC_KINDS
+        if is_number and variable is not None and variable.causality in KINDS[ssp]:
             names[name] = None
     return [part.facts.variables[name] for name in names]
 
 
 def _refuse_no_connector(scene: Scene, where: str, end: str, variable: VariableFacts, ssp: str) -> None:
+    if not variable.scalar:
+        got = f"the {variable.shape} {variable.name}"
+        raise UsageError(f"{scene.source}: {where}: expected a single value in a system (SSP), got {got}.")
     if end == "to" and variable.causality != "input":
         got = f"the tunable parameter {variable.name}"
         raise UsageError(f"{scene.source}: {where}: expected an input in SSP {ssp}, got {got}.")
