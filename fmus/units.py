@@ -177,6 +177,25 @@ def agree(one: Unit, other: Unit) -> bool:
     )
 
 
+def conversion(source: Unit, target: Unit) -> tuple[float, float]:
+    """Return factor and offset that turn numbers of one unit into numbers of another of the same base units.
+
+    >>> conversion(Unit({"K": 1}, 1.0, 273.15), Unit({"K": 1}))
+    (1.0, 273.15)
+    """
+    return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def converts(gain: float, offset: float, source: Unit, target: Unit) -> bool:
+    """Whether gain and offset turn numbers of one unit into the same quantities in another."""
+    if source.exponents != target.exponents:
+        return False
+    factor, shift = conversion(source, target)
+    return math.isclose(gain, factor, rel_tol=FACTOR_TOLERANCE) and math.isclose(
+        offset, shift, rel_tol=FACTOR_TOLERANCE, abs_tol=FACTOR_TOLERANCE
+    )
+
+
 def product_agrees(source: Unit, gain: Unit, target: Unit) -> bool:
     """Whether source times gain is target; units with a shifted zero (degC) have no products."""
     if source.offset or target.offset:

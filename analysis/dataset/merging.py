@@ -168,13 +168,11 @@ def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Datase
                 f"{name}: {dimension}: expected the size {expected} of {first_name}, got {got}."
             )
     for variable, one in first.variables.items():
-        expected, got = (
-            one.shape[1:],
-            part.variables[variable].shape[1:] if variable in part.variables else (),
-        )
-        if one.dims[:1] == ("sample",) and expected != got:
+        other = part.variables.get(variable)
+        if other is not None and one.dims[:1] == ("sample",) and one.shape[1:] != other.shape[1:]:
             raise DatasetError(
-                f"{name}: {variable}: expected samples of the shape {expected} of {first_name}, got {got}."
+                f"{name}: {variable}: expected samples of the shape {one.shape[1:]} of {first_name}, "
+                f"got {other.shape[1:]}."
             )
     _refuse_other_meaning(name, part, first_name, first)
 

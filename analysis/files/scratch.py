@@ -25,6 +25,26 @@ _LOCK = ".owner-of-this-scratch-folder"
 _MOST_TRIES = 100
 
 
+_shown: dict[str, str] = {}
+"""Names in messages of paths in scratch folders of this process."""
+
+
+def show_as(path: str, name: str) -> None:
+    """Let messages of this process show a name for a path in a scratch folder."""
+    _shown[path] = name
+
+
+def with_names(text: str) -> str:
+    """Return a message with the names of paths in scratch folders.
+
+    >>> show_as("/tmp/a/b.toml", "b.ssp"); with_names("/tmp/a/b.toml: expected a rate")
+    'b.ssp: expected a rate'
+    """
+    for path, name in _shown.items():
+        text = text.replace(path, name)
+    return text
+
+
 class ScratchFolder:
     """A folder for temporary files of this process, inside the system's folder for temporary files.
 

@@ -29,7 +29,7 @@ _MARKED = re.compile(
     r"(?P<begin><!-- keys of (?P<model>\w+) -->\n).*?(?P<end><!-- end of keys -->)", re.DOTALL
 )
 _WORDS = {float: "number", int: "whole number", str: "text", bool: "true/false"}
-_PLURALS = {"table": "tables", "pair of numbers": "pairs of numbers"}
+_PLURALS = {"table": "tables", "pair of numbers": "pairs of numbers", "pair of values": "pairs of values"}
 
 
 def with_key_tables(page: str) -> str:
@@ -92,7 +92,7 @@ def _word(form: Any) -> str:
         items = get_args(form)
         word = _word(forms_of(items[0])[0])
         if items[-1] is not Ellipsis:
-            return f"pair of {word}s"
+            return f"pair of {word}s" if len(forms_of(items[0])) == 1 else "pair of values"
         return "array" if word == "number" else f"array of {_PLURALS.get(word, word)}"
     if get_origin(form) is dict or _is_table(form):
         return "table"

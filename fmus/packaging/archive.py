@@ -61,6 +61,9 @@ MOST_LIBRARIES = 3
 #: Limits for reading the XML of an FMU: processor time, s, plus its size over a rate, bytes/s; memory, bytes. Plain
 #: descriptions are read at 2e6 bytes/s, and take 25 bytes of memory for each of their own.
 XML_SECONDS, XML_RATE, XML_MEMORY = 10.0, 5e5, 2 << 30
+LONGEST_SHOWN = 4096
+_SHOWN = ".shown"
+"""Ending of the file beside an FMU with its name in messages."""
 _READER = "vibroimpact.fmus.packaging.description_check:read"
 
 
@@ -90,9 +93,28 @@ class UnpackedFmu:
     identifiers: tuple[str, ...]
 
     @property
+    def shown(self) -> str:
+        """Its name in messages."""
+        return shown_name(self.source)
+
+    @property
     def resources(self) -> Path:
         """Folder of the FMU's resources; it may be absent."""
         return self.folder / "resources"
+
+
+def note_name(path: Path, name: str) -> None:
+    """Let messages of all processes show a name for an FMU file, such as its place in an archive."""
+    path.with_name(path.name + _SHOWN).write_text(name, encoding="utf-8")
+
+
+def shown_name(path: Path) -> str:
+    """Return the name of an FMU file in messages: its path, if no other name was noted."""
+    try:
+        with path.with_name(path.name + _SHOWN).open(encoding="utf-8", errors="replace") as note:
+            return note.read(LONGEST_SHOWN)
+    except OSError:  # there is no note, or no folder any more
+        return str(path)
 
 
 def content_hash(path: Path) -> str:
@@ -156,7 +178,7 @@ def binary_path(fmu: UnpackedFmu) -> Path:
         got = f"{', '.join(other)}"
         hint = "Its file and the modelIdentifier of its description must have one name: ask its maker."
     raise ComponentFileError(
-        f"{fmu.source}: expected a binary for this machine (binaries/{names[0]}), got {got}. {hint}"
+        f"{fmu.shown}: expected a binary for this machine (binaries/{names[0]}), got {got}. {hint}"
     )
 
 

@@ -272,7 +272,9 @@ def _no_current_folder() -> bool:
 def _words(error: Exception, *, debug: bool) -> str:
     """Return the message of an error; for an unexpected one with advice on how to report it."""
     if isinstance(error, VibroimpactError):
-        return error.typed
+        from vibroimpact.analysis.files.scratch import with_names
+
+        return with_names(error.typed)
     if isinstance(error, OSError) and error.errno in _FULL:
         return f"{error.filename or 'Output'}: cannot be written ({error.strerror})."
     hint = "" if debug else f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."

@@ -360,9 +360,7 @@ class Exchange3(ExchangeInstance, ClockedInstance):
         flags = (c_bool(False), c_bool(False))
         pointer = instantiate(*texts, *flags, self.log.environment, callback("fmi3"))
         if not pointer:
-            self.fail(
-                "InstantiateModelExchange", f"made no instance of {self.fmu.source}", ComponentFileError
-            )
+            self.fail("InstantiateModelExchange", f"made no instance of {self.fmu.shown}", ComponentFileError)
         self._pointer.value = pointer
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:
@@ -404,7 +402,7 @@ class Exchange2(ExchangeInstance):
             c_int(1),  # loggingOn: some FMUs report even fatal errors only with it
         )
         if not pointer:
-            self.fail("Instantiate", f"made no instance of {self.fmu.source}", ComponentFileError)
+            self.fail("Instantiate", f"made no instance of {self.fmu.shown}", ComponentFileError)
         self._pointer.value = pointer
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:

@@ -104,7 +104,7 @@ class Instance2(Instance):
             c_int(1),  # loggingOn: some FMUs report even fatal errors only with it
         )
         if not pointer:
-            self.fail("Instantiate", f"made no instance of {self.fmu.source}", ComponentFileError)
+            self.fail("Instantiate", f"made no instance of {self.fmu.shown}", ComponentFileError)
         self._pointer.value = pointer
 
     def _take_kept(self) -> bool:

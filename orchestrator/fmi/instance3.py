@@ -58,7 +58,7 @@ class Instance3(ClockedInstance):
             *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), self._update
         )
         if not pointer:
-            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}", ComponentFileError)
+            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.shown}", ComponentFileError)
         self._pointer.value = pointer
 
     def enter_initialization(self, start_time: float, tolerance: float | None = None) -> None:

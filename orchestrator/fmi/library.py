@@ -23,7 +23,7 @@ class Library:
 
     def __init__(self, fmu: UnpackedFmu) -> None:
         self.fmu = fmu
-        self._handle = _load(binary_path(fmu), fmu.source)
+        self._handle = _load(binary_path(fmu), fmu.shown)
 
     def function(self, name: str, result: Any = ctypes.c_int) -> Function:
         """Return a function by name; ComponentFileError if the binary does not export it."""
@@ -31,14 +31,14 @@ class Library:
             found = self._handle[name]  # a function object of our own: attributes of the handle are shared
         except AttributeError as error:
             raise ComponentFileError(
-                f"{self.fmu.source}: expected a binary that exports {name}, got one without it."
+                f"{self.fmu.shown}: expected a binary that exports {name}, got one without it."
             ) from error
         found.restype = result
         return found
 
 
 @cache
-def _load(path: Path, source: Path) -> ctypes.CDLL:
+def _load(path: Path, source: str) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:

@@ -25,6 +25,7 @@ from typing import Any
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
+from vibroimpact.fmus.packaging.archive import shown_name
 from vibroimpact.fmus.processes.python_child import ending
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard.pipe import BATCH_TIME, MOST_POINTS, Failure, Order, PointTask
@@ -243,7 +244,7 @@ class GuardedRunner(Runner):
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
 
     def _file_of(self, instance: str) -> str:
-        return next((str(spec.fmu) for spec in self.scene.components if spec.name == instance), "")
+        return next((shown_name(spec.fmu) for spec in self.scene.components if spec.name == instance), "")
 
     def close(self) -> None:
         """End the child and remove its notes."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from weakref import WeakValueDictionary
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, LostComponentError
-from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
+from vibroimpact.fmus.packaging.archive import UnpackedFmu, shown_name, unpack
 from vibroimpact.orchestrator.fmi.capabilities import (
     NEEDED_OF_CLOCKS,
     NEEDS_TOOL,
@@ -165,7 +165,7 @@ class Component:
         """Raise ComponentFileError where an FMU needs a capability that no importer here has."""
         if self.capabilities.refusals:
             got = " and ".join(self.capabilities.refusals)
-            raise ComponentFileError(f"{self.spec.fmu}: expected {NEEDED_OF_CLOCKS}, got {got}.")
+            raise ComponentFileError(f"{shown_name(self.spec.fmu)}: expected {NEEDED_OF_CLOCKS}, got {got}.")
 
     def _take_only_instance(self) -> None:
         """Register this component as the only instance of an FMU that allows one per process."""
@@ -435,7 +435,7 @@ def kind_that_runs(spec: ComponentSpec, description: ModelDescription) -> Kind:
         return kinds[0] if spec.run_as == "auto" else spec.run_as
     wanted = "co-simulation or model exchange" if spec.run_as == "auto" else spec.run_as.replace("_", "-")
     got = "scheduled execution" if not kinds else kinds[0].replace("_", "-")
-    raise ComponentFileError(f"{spec.fmu}: expected an FMU with {wanted}, got {got} only.")
+    raise ComponentFileError(f"{shown_name(spec.fmu)}: expected an FMU with {wanted}, got {got} only.")
 
 
 def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeFacts:

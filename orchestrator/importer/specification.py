@@ -93,6 +93,9 @@ class ConnectionSpec:
         Unit of the gain; None: dimensionless.
     offset : float
         Added after the gain, in the unit of the input.
+    mapping : tuple of pairs of int
+        Values of the output, each with the value that the input takes: of whole numbers, items and truth values (0 and
+        1). Empty: values are passed on as they are.
     """
 
     source: tuple[str, str]
@@ -100,6 +103,7 @@ class ConnectionSpec:
     gain: float = 1.0
     gain_unit: str | None = None
     offset: float = 0.0
+    mapping: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 from vibroimpact.orchestrator.importer.component import Component, kind_of
-from vibroimpact.orchestrator.importer.feedthrough import Connections, TransferOrder
+from vibroimpact.orchestrator.importer.feedthrough import Connections, TransferOrder, connection_name
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 
 
@@ -72,7 +74,8 @@ class Transfer:
         self._gains = np.repeat([c.gain for c in connections], sizes)
         self._offsets = np.repeat([c.offset for c in connections], sizes)
         same_type = DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
-        shared = same_type and bool(np.all((self._gains == 1.0) & (self._offsets == 0.0)))
+        changed = any(c.mapping for c in connections)
+        shared = same_type and not changed and bool(np.all((self._gains == 1.0) & (self._offsets == 0.0)))
         own = self.read.values if shared else None
         written = target.instance.group(target_kind, inputs, size=self.read.values.size, values=own)
         self.write = target.clocked(written, [c.target[1] for c in connections])
@@ -81,6 +84,8 @@ class Transfer:
         self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
+        if any(c.mapping for c in self.connections):
+            return partial(_map_values, self.connections, self._ends, self.read.values, self.write.values)
         read, write, gains = self.read.values, self.write.values, self._gains
         offsets = self._offsets if np.any(self._offsets) else None
         if self.kind == "Float64" and write.dtype == np.float64:
@@ -194,6 +199,25 @@ class Transfer:
             *middle,
             StatusCall(self.write.set_call, target, f"Set{self.write.name}", self.write),
         ]
+
+
+def _map_values(
+    connections: Connections, ends: NDArray[np.int64], read: NDArray[Any], write: NDArray[Any]
+) -> int:
+    """Write the values that the mappings of connections give; a value that a mapping lacks raises ComponentError."""
+    for i, connection in enumerate(connections):
+        part = slice(ends[i], ends[i + 1])
+        table = dict(connection.mapping)
+        values = [int(value) for value in read[part]] if table else []
+        lacking = next((value for value in values if value not in table), None)
+        if lacking is not None:
+            known = ", ".join(map(str, table))
+            raise ComponentError(
+                f"{connection_name(connection)}: expected a value of its mapping ({known}), got {lacking}.",
+                instance=connection.source[0],
+            )
+        write[part] = [table[value] for value in values] if table else read[part]
+    return 0
 
 
 #: Scale of values below which they compare as 0.

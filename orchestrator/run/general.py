@@ -162,18 +162,20 @@ class GeneralRunner(Runner):
         self._set_gains(scene)
         self._importer.macro_step = scene.macro_step
         self._importer.contacts.take_numbers(scene.stop_contacts, scene.pairs)
-        end = record.transient_time + record.recorded_time
+        start_time = scene.start_time
+        first = start_time + record.transient_time
+        end = start_time + (record.transient_time + record.recorded_time)
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # overflow is refused at the end of the run
-                self._importer.begin(0.0, start)
+                self._importer.begin(start_time, start)
                 self._energy.begin(scene.connections)
-                self._importer.advance(record.transient_time)
+                self._importer.advance(first)
                 self._recording = True
                 if record.transient_time:
                     for impacts in self._impacts:
                         impacts.forget()
                 if self._sampler is not None:
-                    self._sampler.begin(record.transient_time, end)
+                    self._sampler.begin(first, end)
                 self._importer.advance(end)
         except ImpactLimitReached:
             return (

@@ -24,7 +24,7 @@ def bytes_of_a_run(scene: Scene) -> int:
     rate = scene.sampling_rate
     samples = round(rate * _recorded_seconds(scene)) if rate else 0
     periods = periods if record.each_period else min(periods, 1)
-    numbers = periods * columns_of_periods(scene) + samples * (1 + len(scene.sampled))
+    numbers = periods * columns_of_periods(scene) + samples * (1 + scene.sample_size)
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
 
 

@@ -27,6 +27,9 @@ _VARIABLE_RULE = Rule(
 Reference = Annotated[_Text, _VARIABLE_RULE]
 
 
+_Pair = Annotated[tuple[bool | int | str, bool | int | str], Field(strict=False)]
+
+
 class ComponentTable(SceneTable):
     """`[component.NAME]`: an FMU and the start values of its variables."""
 
@@ -112,6 +115,18 @@ class ConnectionTable(SceneTable):
     offset: Annotated[
         Finite, Rule(doc="added after the gain, in the unit of the input; only between real numbers")
     ] = 0.0
+    mapping: Annotated[
+        tuple[_Pair, ...],
+        Field(strict=False),
+        Rule(
+            "an array of pairs such as [[1, 10], [2, 20]]",
+            item="a pair of values",
+            hint="Each pair has a value of the output, and the value that the input takes.",
+            doc="pairs of a value of the output and the value that the input takes; only between whole numbers, "
+            "enumerations and truth values; any other value of the output is an error",
+            default="empty",
+        ),
+    ] = ()
 
 
 class EventTable(SceneTable):
@@ -274,6 +289,9 @@ PAIR_MODELS: dict[str, type[BodyPair]] = {
 class GeneralRecord(SceneTable):
     """`[record]` of a general scene: transient time, recorded time, and recorded variables."""
 
+    start_time: Annotated[
+        Finite, Rule(unit="s", doc="time at which the run begins; samples and events have times from it on")
+    ] = 0.0
     transient_time: Annotated[NotNegative, Rule(unit="s", doc="time before the recording")] = 0.0
     recorded_time: Annotated[Positive, Rule(unit="s")]
     variables: Annotated[

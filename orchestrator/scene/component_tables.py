@@ -51,6 +51,7 @@ from vibroimpact.orchestrator.scene.models import Execution, Record, TimeSeries
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.components import general_problems, reference_problem
 from vibroimpact.orchestrator.scene.rules.contacts import contact_problems, velocity_input
+from vibroimpact.orchestrator.scene.rules.mappings import mapped_numbers
 from vibroimpact.orchestrator.scene.rules.pairs import PortPlan, plan_ports
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
 from vibroimpact.orchestrator.scene.rules.steps import step_problems
@@ -103,7 +104,7 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
     facts = [component.facts for component in draft.components.values() if component.facts]
     deadline = None if draft.execution is None else draft.execution.deadline
     components = tuple(_component(component, plan, axes, deadline) for component in draft.components.values())
-    connections = tuple(_connection(table) for table in draft.connections if table)
+    connections = tuple(_connection(table, draft) for table in draft.connections if table)
     contacts = tuple(_contact(draft, plan, *each, axes) for each in enumerate(draft.contacts))
     numbers = ComponentNumbers(components, connections, contacts).numbers()
     keys = (*draft.record.variables, *(axis.key for axis in axes), *(key for key, _ in numbers))
@@ -117,6 +118,7 @@ def _parts(draft: GeneralDraft, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> 
         "doubts": tuple(dict.fromkeys(f"{one.file}: {doubt}" for one in facts for doubt in one.doubts)),
         "remarks": {one.file: one.remarks for one in facts if one.remarks},
         "record": _record(draft.record),
+        "start_time": draft.record.start_time,
         "sweep": axes,
         "execution": _execution(draft, draft.execution),
     }
@@ -162,13 +164,14 @@ def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict
     return first
 
 
-def _connection(table: ConnectionTable) -> ConnectionSpec:
+def _connection(table: ConnectionTable, draft: GeneralDraft) -> ConnectionSpec:
     return ConnectionSpec(
         component_variable(table.source),
         component_variable(table.target),
         table.gain,
         table.gain_unit,
         table.offset,
+        mapped_numbers(table, draft),
     )
 
 

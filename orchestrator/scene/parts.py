@@ -67,11 +67,16 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 
 _NAMED_BY_FORM = (
     *("bodies", "contacts", "connections", "events"),
-    *("sample_forms", "declared_units", "doubts", "remarks"),
+    *("sample_forms", "declared_units", "doubts", "remarks", "start_time"),
 )
 """Parts with different names, or no name, in the documents of the two forms."""
 _OWN_TABLES = ("sensor", *CHAIN_TABLES)
 """Tables with numbers besides those of bodies, forces, stops and contacts."""
+
+
+def _without_defaults(connection: dict[str, Any]) -> dict[str, Any]:
+    """Return the document of a connection without an empty mapping: campaigns of versions without it go on."""
+    return {key: value for key, value in connection.items() if key != "mapping" or value}
 
 
 class Parts(SceneTable):
@@ -94,6 +99,7 @@ class Parts(SceneTable):
     sweep: tuple[SweepAxis, ...]
     execution: Execution
     replay: Replay | None = None
+    start_time: float = 0.0
     sample_forms: Mapping[str, SampleForm] = Field(default_factory=dict, repr=False)
     declared_units: Mapping[str, str] = Field(default_factory=dict, repr=False)
     doubts: tuple[str, ...] = Field((), repr=False)
@@ -133,7 +139,7 @@ class Parts(SceneTable):
         swept = (axis.key for axis in self.sweep)
         document = {
             "components": components,
-            "connections": [asdict(connection) for connection in self.connections],
+            "connections": [_without_defaults(asdict(connection)) for connection in self.connections],
             "events": [asdict(event) for event in self.events],
             "variables": self.sampled,
             "rate": None if series is None else series.rate,
@@ -144,6 +150,8 @@ class Parts(SceneTable):
             "doubts": self.doubts,
             "remarks": dict(self.remarks),
         }
+        if self.start_time != 0.0:
+            document["start_time"] = self.start_time
         if self.contacts:  # so that campaigns of versions without contacts go on
             document["contacts"] = [asdict(contact) for contact in self.meetings]
         return document
@@ -282,6 +290,12 @@ class Parts(SceneTable):
     def plain_samples(self) -> tuple[str, ...]:
         """The variables of the time series that are plain numbers, in its order."""
         return tuple(name for name in self.sampled if name not in self.sample_forms)
+
+    @property
+    def sample_size(self) -> int:
+        """The number of values of a sample besides its time: arrays count with all elements."""
+        shapes = (form.shape for form in self.sample_forms.values())
+        return len(self.plain_samples) + sum(math.prod(shape) for shape in shapes)
 
     @property
     def channels(self) -> tuple[str, ...]:

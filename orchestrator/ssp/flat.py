@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from vibroimpact.fmus.units import Unit, agree, gain_unit_between
+from vibroimpact.fmus.units import Unit, agree, conversion, converts, gain_unit_between
 from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.names import GIVING, TAKING
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.structure import Component, Connection, DictionaryReference, System
-from vibroimpact.orchestrator.ssp.values import Parameter, converted, start_value
+from vibroimpact.orchestrator.ssp.values import (
+    Parameter,
+    Table,
+    Transformation,
+    converted,
+    start_value,
+)
 
 _DOT = re.compile(r"\.")
 Path = tuple[str, ...]
@@ -30,7 +36,10 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A component's input: gain times another component's output plus offset, through components that are gains."""
+    """A component's input: gain times another component's output plus offset, through components that are gains.
+
+    With a `table` the input has the value that the table gives for the output.
+    """
 
     source: Node
     target: Node
@@ -38,6 +47,7 @@ class Link:
     gain_unit: str | None = None
     through: tuple[Path, ...] = ()
     offset: float = 0.0
+    table: Table | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,15 +256,15 @@ class FlatSystem:
     def _gain(self, edges: list[_Edge], gains: Mapping[Path, float]) -> Link:
         """Return the edges from an output to an input as one gain and offset."""
         gain, offset, noted, source = 1.0, 0.0, None, self._unit(edges[0].source)
-        unit, passed = source, []
+        unit, passed, table = source, [], _joined_table(edges)
         for edge in edges:
             connection, after = edge.connection, self._unit(edge.target)
             noted = connection.gain_unit or noted
             changes = connection.suppressed or connection.gain_unit is not None
             # the number is converted first, and then transformed
-            by = 1.0 if changes else _conversion(unit, after, connection)
-            by *= 1.0 if connection.factor is None else connection.factor
-            gain, offset = gain * by, offset * by + connection.offset
+            by, shift = (1.0, 0.0) if changes else _conversion(unit, after, connection)
+            change = connection.change or Transformation()
+            gain, offset = gain * by * change.factor, (offset * by + shift) * change.factor + change.offset
             unit = after or unit
             through = self._all.get(edge.target.element) if edge is not edges[-1] else None
             if through is not None:
@@ -264,15 +274,23 @@ class FlatSystem:
                 passed.append(edge.target.element)
                 unit, noted = self._unit(Node(edge.target.element, "output")), through.gain_unit
         target = self._unit(edges[-1].target)
-        if noted is None and source is not None and target is not None and not agree(source, target):
-            noted = gain_unit_between(source, target)
+        if table is not None and (gain, offset) != (1.0, 0.0):
+            got = f"gain {gain:g} and offset {offset:g}"
+            raise RefusalError(edges[-1].connection.where, "no gain beside a mapping of values", got)
+        if (
+            noted is None
+            and source is not None
+            and target is not None
+            and not _fit(gain, offset, source, target)
+        ):
+            noted = gain_unit_between(*(one.difference if one.offset else one for one in (source, target)))
             if noted is None:
                 got = f"{source.name} to {target.name}"
                 raise RefusalError(edges[-1].connection.where, "units whose ratio is one of SI symbols", got)
         if not (math.isfinite(gain) and math.isfinite(offset)):
             got = f"{gain:g} and {offset:g}"
             raise RefusalError(edges[-1].connection.where, "a finite gain and offset", got)
-        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed), offset)
+        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed), offset, table)
 
 
 def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:
@@ -315,20 +333,35 @@ def _taking(node: Node, path: Path) -> frozenset[str]:
     return GIVING if node.element == path else TAKING
 
 
-def _conversion(before: Unit | None, after: Unit | None, connection: Connection) -> float:
-    """Return the conversion factor from one unit to the next."""
+def _fit(gain: float, offset: float, source: Unit, target: Unit) -> bool:
+    """Return whether a connection needs no unit of its gain: one unit, or a conversion between units of two zeros."""
+    have_two_zeros = source.offset != target.offset
+    return agree(source, target) or (have_two_zeros and converts(gain, offset, source, target))
+
+
+def _joined_table(edges: Sequence[_Edge]) -> Table | None:
+    """Return the mappings of values on the way from an output to an input as one; None without any."""
+    table: Table | None = None
+    for edge in edges:
+        change = edge.connection.change
+        if change is None or change.table is None:
+            continue
+        where = edge.connection.where
+        table = change.table if table is None else tuple((a, change.of(b, where)) for a, b in table)
+    return table
+
+
+def _conversion(before: Unit | None, after: Unit | None, connection: Connection) -> tuple[float, float]:
+    """Return factor and offset of the conversion from one unit to the next."""
     if before is None or after is None or agree(before, after):
-        return 1.0
+        return 1.0, 0.0
     got = f"{before.name or '1'} to {after.name or '1'}"
     if before.exponents != after.exponents:
-        if connection.factor is not None:
-            return 1.0  # the factor is the gain, in any unit
+        if connection.change is not None:
+            return 1.0, 0.0  # the factor is the gain, in any unit
         hint = "Give it a LinearTransformation, and suppressUnitConversion."
         raise RefusalError(connection.where, "units of one kind, or a gain", got, hint)
-    if before.offset != after.offset:
-        hint = "Units of two zeros are not connected in this version."
-        raise RefusalError(connection.where, "units with one zero", got, hint)
-    return before.factor / after.factor
+    return conversion(before, after)
 
 
 def _in_unit(parameter: Parameter, unit: Unit | None, where: str) -> StartValue:
@@ -339,11 +372,13 @@ def _in_unit(parameter: Parameter, unit: Unit | None, where: str) -> StartValue:
 
 def _along(parameter: Parameter, connection: Connection, unit: Unit | None) -> Parameter:
     """Return a parameter after a connection."""
+    change, where = connection.change, connection.where
+    if change is not None and change.table is not None:
+        return Parameter(parameter.name, change.of(parameter.value, where), parameter.unit)
     if isinstance(parameter.value, str | bool):
         return parameter
-    if connection.factor is None and not connection.suppressed:
+    if change is None and not connection.suppressed:
         return parameter
     after = None if connection.suppressed else unit
-    value = _in_unit(parameter, after, connection.where)
-    factor = 1.0 if connection.factor is None else connection.factor
-    return Parameter(parameter.name, factor * float(value) + connection.offset, after or None)
+    value = float(_in_unit(parameter, after, where))
+    return Parameter(parameter.name, (change or Transformation()).of(value, where), after or None)

@@ -15,11 +15,11 @@ import tomli_w
 import tomlkit
 
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.files.scratch import ScratchFolder, show_as
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, SceneError, UsageError
 from vibroimpact.fmus.messages import reworded
-from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.archive import note_name, shown_name, unpack
 from vibroimpact.fmus.packaging.members import OWN_DIGITS
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
@@ -97,6 +97,7 @@ def load_system(
         folder.cleanup()
         raise
     _scratch.append(folder)
+    show_as(source, str(path))
     return Imported(scene, tuple(notes))
 
 
@@ -158,7 +159,7 @@ def _text(tables: Mapping[str, Any]) -> str:
 
 def _files(scene: Scene, fmus: str) -> list[FilePath]:
     folder = FilePath(scene.source).parent / fmus
-    return sorted(folder.iterdir()) if folder.is_dir() else []
+    return sorted(folder.glob("*.fmu")) if folder.is_dir() else []
 
 
 def _refuse_another(file: FilePath, content: bytes, force: bool) -> None:
@@ -181,11 +182,19 @@ def _named_in_errors(path: FilePath, source: str) -> Iterator[None]:
     except SceneError as error:
 
         def named(line: str) -> str:
-            return line.replace(source, str(path)).replace(f"{place}/", "")
+            return _by_members(line, FilePath(source)).replace(source, str(path)).replace(f"{place}/", "")
 
         raise SceneError([reworded(line, named) for line in error.problems]) from None
     except ComponentFileError as error:
-        raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
+        line = _by_members(str(error), FilePath(source))
+        raise ComponentFileError(line.replace(f"{place}/", f"{path}: ")) from None
+
+
+def _by_members(line: str, source: FilePath) -> str:
+    """Return a message with the names of members in place of the paths of their copies."""
+    for file in source.with_name(f"{source.stem}_fmus").glob("*.fmu"):
+        line = line.replace(str(file), shown_name(file))
+    return line
 
 
 def _given_end(changes: Sequence[str]) -> float | None:
@@ -204,7 +213,8 @@ def _read(
 ) -> tuple[dict[str, Any], list[str]]:
     structure = read_structure(archive)
     if structure.stop_time is None:
-        structure = replace(structure, stop_time=end)
+        start = structure.start_time or 0.0
+        structure = replace(structure, stop_time=None if end is None else start + end)
     each = dict(components_of(structure.system))
     if not each:
         raise RefusalError(SSD_FILE, "a system with components", "none")
@@ -246,6 +256,7 @@ def _fmus(
         if file is None:
             file = files[component.source] = folder / _file_name(component.source, folder)
             archive.copy(component.source, file)
+            note_name(file, f"{archive.path}: {component.source}")
         if component.is_gain and unpack(file).identifiers[0] == GAIN:
             facts[path] = component_facts(file)
             continue
@@ -261,6 +272,7 @@ def _fmus(
     for file in files.values():
         if file.name not in used:
             file.unlink()
+            file.with_name(f"{file.name}.shown").unlink()
     return fmus, facts, notes
 
 

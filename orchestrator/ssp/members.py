@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.description import ComponentDescription, UnitDefinition
@@ -82,6 +82,8 @@ def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
                     f"{scene.source}: component.{spec.name}.fmu: expected an FMU file to copy, got one of a server."
                 ]
             )
+        values = {name: value for name, value in spec.parameters.items() if not isinstance(value, tuple)}
+        _refuse_arrays(scene, spec, next((name for name in spec.parameters if name not in values), None))
         own, file = _own(spec.fmu), spec.fmu
         if own is not None:
             file = _exported(described[own[0]], spec, _used(scene, spec), travel.fmi or own[1], travel)
@@ -91,7 +93,7 @@ def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
             _member(file.name, content, taken),
             content,
             component_facts(file, spec.run_as),
-            dict(spec.parameters),
+            values,
             *(own or ("", "")),
         )
     if not travel.gains:
@@ -101,6 +103,15 @@ def component_members(scene: Scene, travel: Travel) -> dict[str, Part]:
             gain = _gain(connection, _free_name(f"gain_{number}", parts), parts, taken, travel)
             parts[gain.name] = gain
     return parts
+
+
+def _refuse_arrays(scene: Scene, spec: ComponentSpec, name: str | None) -> None:
+    """Raise UsageError for a start value that is an array."""
+    if name is not None:
+        raise UsageError(
+            f"{scene.source}: component.{spec.name}.parameters.{name}: expected a single value in a system (SSP), "
+            "got an array. Let the FMU keep its own start value."
+        )
 
 
 def _gain(

@@ -241,13 +241,11 @@ class _Reader:
         where = f"{SSD_FILE}: {connection.where}"
         if element.get("startIndices") or element.get("endIndices"):
             raise RefusalError(where, "a connection of single numbers", "elements of an array")
-        factor, offset = read_transformation(element, where) or (None, 0.0)
         own = self._note("Connection", f"{ends[1][0]}.{ends[1][1]}", depth)
         return Connection(
             ends[0],
             ends[1],
-            factor,
-            offset,
+            read_transformation(element, where),
             truth(element.get("suppressUnitConversion", "false"), where),
             None if own is None else own.get("gain_unit"),
         )

@@ -106,6 +106,8 @@ def _connection(link: Link, names: Mapping[Path, str]) -> dict[str, Any]:
         table["gain"] = link.gain
     if link.offset:
         table["offset"] = link.offset
+    if link.table is not None:
+        table["mapping"] = [list(pair) for pair in link.table]
     return table if link.gain_unit is None else {**table, "gain_unit": link.gain_unit}
 
 
@@ -115,9 +117,7 @@ def _reference(node: Node, names: Mapping[Path, str]) -> str:
 
 def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connected: bool) -> Iterator[str]:
     """Fill in the recorded time and the macro step."""
-    if structure.start_time:
-        hint = "A scene begins at 0: shift what depends on time."
-        raise RefusalError(f"{SSD_FILE}: startTime", "0", f"{structure.start_time:g}", hint)
+    start = structure.start_time or 0.0
     record, execution = _table(tables, "record"), _table(tables, "execution")
     if "recorded_time" not in record:
         if structure.stop_time is None:
@@ -125,7 +125,12 @@ def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connecte
             raise RefusalError(
                 f"{SSD_FILE}: DefaultExperiment: stopTime", "the end of the run, s", "none", hint
             )
-        record["recorded_time"] = structure.stop_time
+        if start and not structure.stop_time > start:
+            got = f"{structure.stop_time:g} beside the start {start:g}"
+            raise RefusalError(f"{SSD_FILE}: DefaultExperiment: stopTime", "an end after the start", got)
+        record["recorded_time"] = structure.stop_time - start
+    if start:
+        record["start_time"] = start
     if "macro_step" in execution or not connected:
         return
     own = [one.step for one in facts if one.step is not None]
@@ -142,7 +147,11 @@ def _record(
     """Record all outputs that the system names, unless the scene selects its variables."""
     record = tables["record"]
     duration = record.get("recorded_time")
-    if len(record) > 1 or not isinstance(duration, int | float) or duration <= 0.0:
+    if (
+        record.keys() - {"recorded_time", "start_time"}
+        or not isinstance(duration, int | float)
+        or duration <= 0.0
+    ):
         return
     outputs = [
         f"{names[path]}.{name}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from vibroimpact.fmus.units import Unit
 from vibroimpact.orchestrator.importer.specification import RunAs
-from vibroimpact.orchestrator.ssp.values import Binding
+from vibroimpact.orchestrator.ssp.values import Binding, Transformation
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +28,8 @@ class Connection:
     start: tuple[str | None, str]
     end: tuple[str | None, str]
     """`start` and `end`: element (None: the system itself) and connector."""
-    factor: float | None = None
-    """Factor of its linear transformation, and below it the offset; None without a transformation."""
-    offset: float = 0.0
+    change: Transformation | None = None
+    """Its transformation; None without one."""
     suppressed: bool = False
     """Whether units are not converted."""
     gain_unit: str | None = None

@@ -20,13 +20,10 @@ from vibroimpact.orchestrator.ssp.names import INTEGER_TYPES, REAL_TYPES, VERSIO
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
 
 Units = Mapping[str, Unit]
-TRANSFORMATIONS = (
-    "BooleanMappingTransformation",
-    "IntegerMappingTransformation",
-    "EnumerationMappingTransformation",
-)
 
 LONGEST_NAME = 2000
+MOST_ENTRIES = 10_000
+"""Most entries of a mapping of values."""
 _MOST_NAMED = 5
 """Most elements that a message lists."""
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
@@ -43,14 +40,47 @@ class Parameter:
     unit: Unit | None = None
 
 
+Table = tuple[tuple[StartValue, StartValue], ...]
+"""Values of a source, each with the value of the target."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transformation:
+    """A change of values: factor times the value plus offset, or the table of a mapping."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+    table: Table | None = None
+
+    def of(self, value: StartValue, where: str) -> StartValue:
+        """Return the changed value; RefusalError for a value that the transformation does not take."""
+        if self.table is not None:
+            return mapped_value(self.table, value, where)
+        if (self.factor, self.offset) == (1.0, 0.0):
+            return value
+        if isinstance(value, str | bool):
+            raise RefusalError(where, "a number where there is a linear transformation", quoted(value))
+        return self.factor * value + self.offset
+
+
+def mapped_value(table: Table, value: StartValue, where: str) -> StartValue:
+    """Return the value that a table gives for another one; RefusalError if it has none."""
+    found = next(
+        (target for source, target in table if type(source) is type(value) and source == value), None
+    )
+    if found is None:
+        known = ", ".join(quoted(source) for source, _ in table[:_MOST_NAMED])
+        raise RefusalError(where, f"a value of its mapping ({known})", quoted(value))
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """An entry of a mapping: `target` is factor times `source` plus offset."""
+    """An entry of a mapping: `target` has the changed value of `source`."""
 
     source: str
     target: str
-    factor: float = 1.0
-    offset: float = 0.0
+    change: Transformation = Transformation()
     suppressed: bool = False
 
 
@@ -84,13 +114,9 @@ def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | Non
 
 
 def _mapped(parameter: Parameter, entry: Mapped) -> Parameter:
-    value, unit = parameter.value, None if entry.suppressed else parameter.unit
-    if (entry.factor, entry.offset) == (1.0, 0.0):
-        return Parameter(entry.target, value, unit)
-    if isinstance(value, str | bool):
-        got = f"{quoted(value)} of {parameter.name[:60]}"
-        raise RefusalError("parameter mapping", "a number where there is a linear transformation", got)
-    return Parameter(entry.target, entry.factor * value + entry.offset, unit)
+    unit = None if entry.suppressed else parameter.unit
+    value = entry.change.of(parameter.value, f"parameter mapping of {parameter.name[:60]}")
+    return Parameter(entry.target, value, unit)
 
 
 def read_units(root: Element, where: str) -> dict[str, Unit]:
@@ -177,21 +203,32 @@ def read_mapping(root: Element, where: str) -> tuple[Mapped, ...]:
 def _entry(element: Element, where: str) -> Mapped:
     source, target = element.get("source", ""), element.get("target", "")
     where = f"{where}: {source[:60]} -> {target[:60]}"
-    factor, offset = read_transformation(element, where) or (1.0, 0.0)
+    change = read_transformation(element, where) or Transformation()
     suppressed = truth(element.get("suppressUnitConversion", "false"), where)
-    return Mapped(source, target, factor, offset, suppressed)
+    return Mapped(source, target, change, suppressed)
 
 
-def read_transformation(element: Element, where: str) -> tuple[float, float] | None:
-    """Return factor and offset of a linear transformation; None without a transformation."""
+def read_transformation(element: Element, where: str) -> Transformation | None:
+    """Return the transformation of an element; None without one."""
     for child in element:
         kind = child.tag.rpartition("}")[2]
         if kind in TRANSFORMATIONS:
-            hint = "A mapping of values is not available in this version: take it out."
-            raise RefusalError(where, "a linear transformation, or none", kind, hint)
+            return Transformation(table=_table(child, TRANSFORMATIONS[kind], f"{where}: {kind}"))
         if kind == "LinearTransformation":
-            return number(child.get("factor", "1"), where), number(child.get("offset", "0"), where)
+            return Transformation(
+                number(child.get("factor", "1"), where), number(child.get("offset", "0"), where)
+            )
     return None
+
+
+def _table(element: Element, read: Callable[[str, str], StartValue], where: str) -> Table:
+    entries = [child for child in element if child.tag.rpartition("}")[2] == "MapEntry"]
+    if not 0 < len(entries) <= MOST_ENTRIES:
+        raise RefusalError(where, f"1 to {MOST_ENTRIES} entries", str(len(entries)))
+    table = tuple((read(one.get("source", ""), where), read(one.get("target", ""), where)) for one in entries)
+    if len({source for source, _ in table}) != len(table):
+        raise RefusalError(where, "each source once", "one twice")
+    return table
 
 
 def start_value(variable: VariableFacts, parameter: Parameter, where: str) -> StartValue:
@@ -267,3 +304,9 @@ _READ: Mapping[str, Callable[[str, str], StartValue]] = {
     "String": _text,
     "Enumeration": _text,
 }
+TRANSFORMATIONS: Mapping[str, Callable[[str, str], StartValue]] = {
+    "BooleanMappingTransformation": truth,
+    "IntegerMappingTransformation": whole,
+    "EnumerationMappingTransformation": _text,
+}
+"""Mappings of values, each with the reader of its values."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -80,7 +80,8 @@ def description(scene: Scene, parts: Mapping[str, Part], ssp: str, duration: flo
                 _connection(joined, connection, parts)
     _master(system, scene)
     _units(root, [variable for variables in shown.values() for variable in variables])
-    experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
+    start, stop = repr(scene.start_time), repr(scene.start_time + duration)
+    experiment = SubElement(root, "ssd:DefaultExperiment", startTime=start, stopTime=stop)
     annotations = SubElement(experiment, "ssd:Annotations")  # OMSimulator accepts none higher up
     if scene.connections:
         step = SubElement(annotations, "ssc:Annotation", type=OSP_ANNOTATION)
@@ -191,12 +192,16 @@ def _shown(part: Part, scene: Scene, ssp: str) -> list[VariableFacts]:
     recorded = (component_variable(reference) for reference in scene.sampled)
     for component, name in recorded:
         variable = part.facts.variables.get(name) if component == part.name else None
-        if variable is not None and variable.causality in KINDS[ssp] and variable.kind in NUMERIC_KINDS:
+        is_number = variable is not None and variable.scalar and variable.kind in NUMERIC_KINDS
+        if is_number and variable is not None and variable.causality in KINDS[ssp]:
             names[name] = None
     return [part.facts.variables[name] for name in names]
 
 
 def _refuse_no_connector(scene: Scene, where: str, end: str, variable: VariableFacts, ssp: str) -> None:
+    if not variable.scalar:
+        got = f"the {variable.shape} {variable.name}"
+        raise UsageError(f"{scene.source}: {where}: expected a single value in a system (SSP), got {got}.")
     if end == "to" and variable.causality != "input":
         got = f"the tunable parameter {variable.name}"
         raise UsageError(f"{scene.source}: {where}: expected an input in SSP {ssp}, got {got}.")
@@ -245,9 +250,37 @@ def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]
     )
     if differ or spec.gain_unit is not None:
         connection.set("suppressUnitConversion", "true")  # the gain is the only change of the number
-    if spec.gain != 1.0 or spec.offset or differ:
+    if spec.mapping:
+        _mapping(
+            connection, spec, [parts[end[0]].facts.variables[end[1]] for end in (spec.source, spec.target)]
+        )
+    elif spec.gain != 1.0 or spec.offset or differ:
         # some tools take 0 for a missing attribute
         SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset=repr(spec.offset))
+
+
+def _mapping(connection: Element, spec: ConnectionSpec, ends: Sequence[VariableFacts]) -> None:
+    """Write the mapping of a connection: by items between enumerations, else by numbers or truth values."""
+    kinds = {variable.kind for variable in ends}
+    if len(kinds) > 1 and "boolean" in kinds:
+        where = f"{'.'.join(spec.source)} -> {'.'.join(spec.target)}"
+        raise UsageError(
+            f"{where}: expected a mapping between values of one type in SSP, got one of truth values."
+        )
+    kind = {"boolean": "Boolean", "enumeration": "Enumeration"}.get(
+        kinds.pop() if len(kinds) == 1 else "", "Integer"
+    )
+    mapping = SubElement(connection, f"ssc:{kind}MappingTransformation")
+    for pair in spec.mapping:
+        source, target = (_mapped(kind, variable, value) for variable, value in zip(ends, pair, strict=True))
+        SubElement(mapping, "ssc:MapEntry", source=source, target=target)
+
+
+def _mapped(kind: str, variable: VariableFacts, value: int) -> str:
+    if kind == "Boolean":
+        return "true" if value else "false"
+    names = {number: name for name, number in variable.items.items()}
+    return names[value] if kind == "Enumeration" else str(value)
 
 
 def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:

@@ -30,7 +30,14 @@ from vibroimpact.analysis.dataset.assembling import Named, new_variable
 from vibroimpact.analysis.dataset.derived import RANGE, RANGE_ENDS, range_over_periods
 from vibroimpact.analysis.dataset.grid import direction_codes, direction_words, range_attributes
 from vibroimpact.analysis.dataset.schema import RAGGED, RULES, constant_names, swept_names
-from vibroimpact.analysis.dataset.stores.grid import CHUNK_POINTS, SHARD_POINTS, Block, StoreGrid
+from vibroimpact.analysis.dataset.stores.grid import Block, StoreGrid
+from vibroimpact.analysis.dataset.stores.new_arrays import (
+    NewArray,
+    cells_array,
+    rows_array,
+    shards_array,
+    whole_array,
+)
 from vibroimpact.analysis.dataset.stores.overview import CLASSES, OVERVIEW, BlockGrid, names_of, quantities_of
 from vibroimpact.analysis.files.at_once import done_at_once
 from vibroimpact.analysis.files.store_attributes import COORDINATES, STORE_ID, attributes_stored
@@ -53,22 +60,8 @@ OF_SHARDS = ("shard", *(f"{dim}_shard" for dim in RAGGED))
 """Dimensions with an element for each shard."""
 LABELS = {"interface": "connection", "comparison": "compared"}
 """Dimensions of a file that are named by a variable in an opened dataset."""
-MOST_ROWS = 1 << 40
-"""Number of rows of a shard for which its arrays are announced until the store is finished."""
 _LAST = np.iinfo(np.int32).max
 RUN_ID = {"long_name": "position of the run in the file", "units": "1"}
-
-
-@dataclass(frozen=True, slots=True)
-class _Array:
-    """One array before it is made: dimensions, sizes, cells of a chunk and of a shard, type, attributes."""
-
-    dims: tuple[str, ...]
-    shape: tuple[int, ...]
-    chunk: tuple[int, ...]
-    shard: tuple[int, ...]
-    dtype: Any
-    attrs: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +118,7 @@ def create_store(
             _made(group, name, one, linked)
         _make_overview(group, like, grid)
         for name, variable in fixed.items():
-            made = _made(group, name, _whole(variable), "")
+            made = _made(group, name, whole_array(variable), "")
             values = variable.values
             made[...] = values.astype(object) if values.dtype.kind in "UO" else values
 
@@ -367,35 +360,37 @@ class StoreWriter:
         return done_at_once(lambda block: found(array[block]), grid.blocks(), self._place)
 
 
-def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict[str, _Array]:
+def _arrays(like: xr.Dataset, grid: StoreGrid, sizes: Mapping[str, int]) -> dict[str, NewArray]:
     """Return the arrays of runs and rows, by name."""
     kept = {*_fixed(like)}
     kept |= set() if grid.is_line else {"direction", *swept_names(like)}
-    found: dict[str, _Array] = {}
+    found: dict[str, NewArray] = {}
     for name, variable in like.variables.items():
         if name in kept:
             continue
         if variable.dims[0] in RAGGED:
             elements = {str(each): variable.sizes[each] for each in variable.dims[1:]}
-            found[str(name)] = _rows(str(variable.dims[0]), grid, variable.dtype, variable.attrs, elements)
+            found[str(name)] = rows_array(
+                str(variable.dims[0]), grid, variable.dtype, variable.attrs, elements
+            )
         else:
             further = {LABELS.get(str(d), str(d)): sizes.get(str(d), n) for d, n in variable.sizes.items()}
             further.pop("run")
-            found[str(name)] = _cells(grid, further, variable.dtype, variable.attrs)
+            found[str(name)] = cells_array(grid, further, variable.dtype, variable.attrs)
     if grid.is_line:
-        found["direction"] = _cells(grid, {}, object, {"long_name": RULES["direction"].long_name})
-    found["run_id"] = _cells(grid, {}, np.int32, RUN_ID)
+        found["direction"] = cells_array(grid, {}, object, {"long_name": RULES["direction"].long_name})
+    found["run_id"] = cells_array(grid, {}, np.int32, RUN_ID)
     if all(name in found for name in RANGE_ENDS):
         attributes = range_attributes(like.variables[RANGE_ENDS[0]])
-        found[RANGE] = _cells(grid, {}, np.float64, attributes)
+        found[RANGE] = cells_array(grid, {}, np.float64, attributes)
     for dim, count in RAGGED.items():
         if count in found:
             owner = {"long_name": f"run_id of the run of each {dim}", "units": "1"}
-            found[f"{dim}_run"] = _rows(dim, grid, np.int32, owner)
+            found[f"{dim}_run"] = rows_array(dim, grid, np.int32, owner)
             number = {"long_name": f"number of rows of {dim} in each shard", "units": "1"}
-            found[f"{dim}_rows"] = _of_shards(f"{dim}_shard", grid, number)
+            found[f"{dim}_rows"] = shards_array(f"{dim}_shard", grid, number)
             order = {"long_name": "numbers of the shards in the order of their runs", "units": "1"}
-            found[SHARD_ORDER] = _of_shards("shard", grid, order)
+            found[SHARD_ORDER] = shards_array("shard", grid, order)
     return found
 
 
@@ -407,7 +402,7 @@ def _make_overview(group: Any, like: xr.Dataset, grid: StoreGrid) -> None:
     overview = group.create_group(OVERVIEW)
     for name in names_of(like.variables):
         dtype = RULES[name].dtype if name in CLASSES else np.float64
-        one = _Array(grid.dims, blocks.shape, blocks.in_shard, blocks.in_shard, dtype, {})
+        one = NewArray(grid.dims, blocks.shape, blocks.in_shard, blocks.in_shard, dtype, {})
         _made(overview, name, one, "")
 
 
@@ -421,43 +416,6 @@ def _fixed(like: xr.Dataset) -> dict[str, xr.Variable]:
     return found
 
 
-def _cells(grid: StoreGrid, further: Mapping[str, int], dtype: Any, attrs: Mapping[str, Any]) -> _Array:
-    chunk, shard = grid.chunks_of(tuple(further.values()))
-    return _Array((*grid.dims, *further), (*grid.shape, *further.values()), chunk, shard, dtype, attrs)
-
-
-def _rows(
-    dim: str,
-    grid: StoreGrid,
-    dtype: Any,
-    attrs: Mapping[str, Any],
-    elements: Mapping[str, int] | None = None,
-) -> _Array:
-    """Return the array of the rows of a ragged dimension; `elements` are the dimensions of each row."""
-    names, sizes = tuple(elements or ()), tuple((elements or {}).values())
-    # a shard has whole chunks
-    chunk = max(1, CHUNK_POINTS // math.prod(sizes))
-    shard = chunk * (SHARD_POINTS // CHUNK_POINTS)
-    return _Array(
-        (f"{dim}_shard", f"{dim}_row", *names),
-        (grid.shards, MOST_ROWS, *sizes),
-        (1, chunk, *sizes),
-        (1, shard, *sizes),
-        dtype,
-        attrs,
-    )
-
-
-def _of_shards(dim: str, grid: StoreGrid, attrs: Mapping[str, Any]) -> _Array:
-    return _whole(new_variable((dim,), np.zeros(grid.shards, dtype=np.int64), attrs))
-
-
-def _whole(variable: xr.Variable) -> _Array:
-    dims, one = tuple(map(str, variable.dims)), (SHARD_POINTS,) * variable.ndim
-    size = tuple(min(most, max(n, 1)) for most, n in zip(one, variable.shape, strict=True))
-    return _Array(dims, variable.shape, size, size, variable.dtype, variable.attrs)
-
-
 def _linked(like: xr.Dataset, grid: StoreGrid, fixed: Mapping[str, xr.Variable]) -> str:
     """Return the names of the coordinates of runs, in the order of the scene, for the attribute of each variable."""
     names = ["run_index", "direction", *swept_names(like), *fixed]
@@ -465,7 +423,7 @@ def _linked(like: xr.Dataset, grid: StoreGrid, fixed: Mapping[str, xr.Variable])
     return " ".join(dict.fromkeys(linked))
 
 
-def _made(group: Any, name: str, one: _Array, linked: str) -> Any:
+def _made(group: Any, name: str, one: NewArray, linked: str) -> Any:
     """Make one array of a store."""
     attributes = attributes_stored(one.attrs)
     if linked and name not in linked.split():

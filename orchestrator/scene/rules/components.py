@@ -13,6 +13,8 @@ from functools import partial
 from vibroimpact.fmus.units import (
     Unit,
     agree,
+    conversion,
+    converts,
     gain_unit_between,
     parse_unit,
     product_agrees,
@@ -31,6 +33,7 @@ from vibroimpact.orchestrator.scene.component_numbers import (
 from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.mappings import mapping_problems
 from vibroimpact.orchestrator.scene.rules.scene import sample_problems
 
 MOST_STEPS_PER_RUN = 10**10
@@ -167,6 +170,9 @@ def _type_problems(
     connection: ConnectionTable, place: int, source: VariableFacts, target: VariableFacts
 ) -> Iterator[Problem]:
     where = key_path(("connection", place))
+    if connection.mapping:
+        yield from mapping_problems(connection, f"{where}.mapping", source, target)
+        return
     if source.kind != target.kind and not {source.kind, target.kind} <= _NUMBERED:
         got = f"{source.type} ({connection.source}) to {target.type} ({connection.target})"
         yield Problem(where, "two variables of one type", got)
@@ -195,12 +201,32 @@ def _unit_problems(
     hint = f'Give the gain with its unit: gain_unit = "{suggested}".' if suggested else ""
     where = key_path(("connection", place))
     if gain is None:
-        if not agree(source.unit, target.unit):
+        same = agree(source.unit, target.unit)
+        if not same and not converts(connection.gain, connection.offset, source.unit, target.unit):
             got = f"{ends[0]} to {ends[1]}"
-            yield Problem(where, "the same unit at both ends", got, hint)
-    elif not product_agrees(source.unit, gain, target.unit):
+            yield Problem(
+                where, "the same unit at both ends", got, hint or _conversion_hint(source.unit, target.unit)
+            )
+    elif not _is_product(connection, source.unit, gain, target.unit):
         expected = f"a unit that turns {ends[0]} into {ends[1]}"
         yield Problem(f"{where}.gain_unit", expected, quoted(connection.gain_unit), hint)
+
+
+def _is_product(connection: ConnectionTable, source: Unit, gain: Unit, target: Unit) -> bool:
+    """Return whether source times gain is target; a unit with a shifted zero counts as that of its differences.
+
+    It has products only beside an offset, which says that the zeros were thought of.
+    """
+    if (source.offset or target.offset) and connection.offset == 0.0:
+        return False
+    return product_agrees(source.difference, gain, target.difference)
+
+
+def _conversion_hint(source: Unit, target: Unit) -> str:
+    if source.exponents != target.exponents:
+        return ""
+    factor, offset = conversion(source, target)
+    return f"Convert it: gain = {factor!r}, offset = {offset!r}."
 
 
 def _inputs_have_one_source(draft: GeneralDraft) -> Iterator[Problem]:

@@ -199,10 +199,11 @@ def _given_port_problem(component: DraftComponent, port: str, where: str, point:
     # lean descriptions have only numbers
     if given in (contact_law("none").number, contact_law(PAIR_LAW).number):
         return None
+    assert isinstance(given, int)
     names = {number: name for name, number in law.items.items()}
     hint = f'Remove {port}.law from its parameters: a pair sets it to "{PAIR_LAW}".'
     return Problem(
-        where, "a port without a stop", f"{quoted(point)} with the law {names.get(int(given), given)}", hint
+        where, "a port without a stop", f"{quoted(point)} with the law {names.get(given, given)}", hint
     )
 
 

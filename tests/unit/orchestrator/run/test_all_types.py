@@ -17,9 +17,10 @@ from support.serial_pool import workers_here
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.stores.converting import convert
 from vibroimpact.analysis.dataset.stores.runs import read_runs
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign, schedule
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp import export_system
 
 WHOLE = {
     f"{u}Int{bits}": (0 if u else -(2 ** (bits - 1)), 2 ** (bits - (not u)) - 1)
@@ -285,3 +286,16 @@ def test_a_figure_says_which_variables_it_leaves_out(folder: Path, tmp_path: Pat
     made = vi.run(scene(folder, {}, ["word", "x", "big"]))
     (axis,) = made.vibroimpact.samples().pipe(lambda _: vi.draw(made)).axes
     assert axis.get_xlabel().endswith(", without c_word, c_x (arrays, texts)")
+
+
+def test_arrays_have_no_form_in_an_exported_system(folder: Path, tmp_path: Path) -> None:
+    for made, expected in (
+        (connected(folder, 'from = "a.z"\nto = "b.u"'), "component.a.parameters.u: expected a single value"),
+        (
+            scene(folder, {}, ["x"], connection=[{"from": "c.z", "to": "c.u"}]),
+            "connection[1].from: expected a single value in a system (SSP), got the array of Float64 z",
+        ),
+    ):
+        with pytest.raises(UsageError) as refused:
+            export_system(made, tmp_path / "s.ssp", ssp="2.0")
+        assert expected in str(refused.value)

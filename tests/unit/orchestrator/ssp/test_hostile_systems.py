@@ -125,7 +125,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
                 f"<ssc:IntegerMappingTransformation>{MAP_ENTRY}</ssc:IntegerMappingTransformation>",
             ),
         ),
-        "take it out",
+        "expected a mapping only between whole numbers",
     ),
     "a mapped table of values": (
         ssd(
@@ -137,7 +137,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
                 )
             )
         ),
-        "take it out",
+        "BooleanMappingTransformation: expected 1 to 10000 entries, got 0",
     ),
     "ends of no kind": (
         ssd(part("a").replace(' kind="output"', "") + part("b"), connection("a.displacement", "b.force")),
@@ -163,7 +163,10 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
     "an array": (ssd(part(bindings=values({"mass": real(1.0).replace("1.0", "1 2")}))), "finite number"),
     "a value out of range": (ssd(part(bindings=values({"mass": real(-1.0)}))), "got -1"),
     "bytes": (ssd(part(bindings=values({"mass": '<ssv:Binary value="00"/>'}))), "got Binary"),
-    "a late start": (ssd(part(), times='startTime="1" stopTime="2"'), "begins at 0"),
+    "an end before the start": (
+        ssd(part(), times='startTime="3" stopTime="2"'),
+        "expected an end after the start",
+    ),
     "an endless run": (ssd(part(), times='stopTime="INF"'), "finite number"),
     "a note that is no TOML": (ssd(part(), more=noted("a = ")), "Take the annotation out"),
     "a note that says components": (
