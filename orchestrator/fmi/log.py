@@ -6,9 +6,13 @@ A component that logs a million lines costs no memory and no call into Python.
 from __future__ import annotations
 
 import ctypes
+import sys
 from collections.abc import Iterable
+from functools import cache
+from typing import Any
 
 from vibroimpact.fmus.core import core_library
+from vibroimpact.fmus.errors import ComponentError
 
 LINES = 20
 LENGTH = 480
@@ -28,12 +32,17 @@ class LogTail:
 
     Parameters
     ----------
-    memory : memoryview or None
+    memory : memoryview, array or None
         `RING_SIZE` writable bytes, such as shared memory; None: memory of its own.
     """
 
-    def __init__(self, memory: memoryview | None = None) -> None:
+    def __init__(self, memory: memoryview | ctypes.Array[ctypes.c_char] | None = None) -> None:
         self._ring = _Ring() if memory is None else _Ring.from_buffer(memory)
+
+    @classmethod
+    def at(cls, address: int) -> LogTail:
+        """Return the tail that lies at an address, as `environment` gives it."""
+        return cls((ctypes.c_char * RING_SIZE).from_address(address))
 
     @property
     def environment(self) -> ctypes.c_void_p:
@@ -58,7 +67,45 @@ class LogTail:
         return bytes(self._ring.lines[slot].value).decode("utf-8", "replace")
 
 
+@cache
 def callback(name: str) -> ctypes.c_void_p:
-    """Return the address of one of the core library's callbacks: `fmi2`, `fmi3`, `allocate`, `free`, `update`."""
-    function = getattr(core_library(), f"vi_log_ring_{name}")
+    """Return the address of a callback, `fmi2`, `fmi3`, `allocate`, `free` or `update`: the core library's where it is built.
+
+    Elsewhere (a server of FMUs in a 32-bit Python) the callback is Python's own. FMI 2.0's messages then keep their
+    percent signs, since Python cannot read the values behind them.
+    """
+    try:
+        function = getattr(core_library(), f"vi_log_ring_{name}")
+    except ComponentError:
+        function = _plain_callback(name)
+        _kept.append(function)
     return ctypes.cast(function, ctypes.c_void_p)
+
+
+#: Callbacks of Python's own, which FMUs hold.
+_kept: list[Any] = []
+
+
+def _plain_callback(name: str) -> Any:
+    if name in ("allocate", "free"):
+        library = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
+        return library.calloc if name == "allocate" else library.free
+    if name == "update":
+        times = ctypes.c_void_p, ctypes.c_double
+        answers = ctypes.POINTER(ctypes.c_bool), ctypes.POINTER(ctypes.c_double)
+        return ctypes.CFUNCTYPE(None, *times, *[ctypes.c_bool] * 4, *answers)(_go_on)
+    text, kinds = ctypes.c_char_p, {"fmi2": (ctypes.c_char_p, ctypes.c_int), "fmi3": (ctypes.c_int,)}
+
+    def log(environment: int, *arguments: Any) -> None:
+        LogTail.at(environment).add([(arguments[-1] or b"").decode("utf-8", "replace")])
+
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, *kinds[name], text, text)(log)
+
+
+def _go_on(environment: int, time: float, *arguments: Any) -> None:
+    """Let a step go on to its end, as `vi_log_ring_update` does."""
+    is_early, until = arguments[-2:]
+    if is_early:
+        is_early[0] = False
+    if until:
+        until[0] = time

@@ -72,7 +72,11 @@ class ServedInstance:
             f"Free{word}": self._free_state,
         }
         if self._is_3:
-            clock = {"GetIntervalDecimal": (c_double, c_int), "GetShiftDecimal": (c_double,)}
+            clock = {
+                "GetClock": (c_bool,),
+                "GetIntervalDecimal": (c_double, c_int),
+                "GetShiftDecimal": (c_double,),
+            }
             self._others |= {
                 name: lambda call, kinds=kinds: self._clock(call, *kinds) for name, kinds in clock.items()
             }
@@ -131,8 +135,8 @@ class ServedInstance:
     def _instantiate(self, call: Any) -> Any:
         name = call.texts[0] if call.texts else ""
         flags = [bool(number) for number in call.numbers]
-        if len(flags) != 2 or "\0" in name:
-            raise Refused("expected a name and two flags for an instance, got others.")
+        if len(flags) != 3 or "\0" in name:
+            raise Refused("expected a name and three flags for an instance, got others.")
         try:
             if self._is_3:
                 self._instance = Instance3(
@@ -140,6 +144,7 @@ class ServedInstance:
                     name,
                     event_mode=flags[0],
                     early_return=flags[1],
+                    updates=flags[2],
                     log=self._log,
                     wrap=self._wrap,
                 )

@@ -64,7 +64,7 @@ def main(bell: int | None) -> None:
     instance, goes_on = ServedInstance(fmu, notes.log, notes.noted), True
     while goes_on and (message := _message(orders)) is not None:
         answer, goes_on = instance.answer(message)
-        write_whole(answers, [LENGTH.pack(len(answer)), answer])
+        write_whole(answers, [LENGTH.pack(len(answer)), bytes([goes_on]), answer])
     instance.free()
     os._exit(0)  # nothing that is left of an FMU needs to end
 

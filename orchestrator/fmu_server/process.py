@@ -49,8 +49,8 @@ class FmuProcess:
         order = json.dumps({"fmu": asdict(fmu), "notes": str(path)}, default=str).encode()
         self._process.say([LENGTH.pack(len(order)), order])
 
-    def ask(self, batch: bytes) -> bytes:
-        """Send a batch and return its answer.
+    def ask(self, batch: bytes) -> tuple[bytes, bool]:
+        """Send a batch; return its answer, and whether others may follow.
 
         Raises
         ------
@@ -60,11 +60,11 @@ class FmuProcess:
         self._is_busy = True
         self._process.say([LENGTH.pack(len(batch)), batch])
         head = self._process.stdout.read(LENGTH.size)
-        answer = self._process.stdout.read(LENGTH.unpack(head)[0]) if len(head) == LENGTH.size else b""
+        answer = self._process.stdout.read(1 + LENGTH.unpack(head)[0]) if len(head) == LENGTH.size else b""
         self._is_busy = False
         if not answer:
             raise ProcessEnded(self._what_happened())
-        return answer
+        return answer[1:], bool(answer[0])
 
     def _what_happened(self) -> str:
         code = self._process.end(END_SECONDS)

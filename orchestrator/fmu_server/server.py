@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -65,7 +66,8 @@ class _Stream:
     """An instance that runs, as seen by the thread that ends idle ones."""
 
     def __init__(self, context: Any) -> None:
-        self.context, self.last, self.is_idle = context, time.monotonic(), False
+        self.context = context
+        self.last = math.inf  # time of the last answer, s; infinite during a call
 
 
 class FmuServer:
@@ -187,10 +189,12 @@ class FmuServer:
             try:
                 context.add_callback(process.abandon)
                 for batch in batches:
-                    answer = process.ask(batch)
+                    stream.last = math.inf
+                    answer, goes_on = process.ask(batch)
                     stream.last = time.monotonic()
                     yield answer
-                    stream.last = time.monotonic()
+                    if not goes_on:
+                        return
             except ProcessEnded as end:
                 context.abort(grpc.StatusCode.ABORTED, f"{end}.")
             except grpc.RpcError:

@@ -77,8 +77,9 @@ class RemoteFunctions:
         others: dict[str, Function] = {
             "SetString": self._set_string,
             "SetClock": self._set_clock,
-            "GetIntervalDecimal": partial(self._get_clock_time, "GetIntervalDecimal"),
-            "GetShiftDecimal": partial(self._get_clock_time, "GetShiftDecimal"),
+            "GetClock": partial(self._ask_clock, "GetClock"),
+            "GetIntervalDecimal": partial(self._ask_clock, "GetIntervalDecimal"),
+            "GetShiftDecimal": partial(self._ask_clock, "GetShiftDecimal"),
             "GetDirectionalDerivative": self._derivative,
             f"Get{word}": partial(self._save, f"Get{word}"),
             f"Set{word}": partial(self._restore, f"Set{word}"),
@@ -164,7 +165,7 @@ class RemoteFunctions:
     def _set_clock(self, _: Any, places: Any, count: Any, ticks: Any) -> int:
         return self._later(Call(function="SetClock", references=_references(places, count)))
 
-    def _get_clock_time(self, name: str, _: Any, place: Any, count: Any, *results: Any) -> int:
+    def _ask_clock(self, name: str, _: Any, place: Any, count: Any, *results: Any) -> int:
         result = self._flushed([Call(function=name, references=_references(place, count))])
         for reference, number in zip(results, result.numbers, strict=bool(result.numbers)):
             kind = type(reference._obj)

@@ -52,8 +52,8 @@ class _Remote(Instance):
         return found if self.wrap is None else self.wrap(self.prefix + name, found)
 
     def _instantiate(self) -> None:
-        events, early = (getattr(self, flag, False) for flag in ("event_mode", "may_return_early"))
-        answer = self._session.begin([Call(function=INSTANTIATE, texts=[self.name], numbers=[events, early])])
+        flags = [getattr(self, flag, False) for flag in ("event_mode", "may_return_early", "_updates")]
+        answer = self._session.begin([Call(function=INSTANTIATE, texts=[self.name], numbers=flags)])
         (result,) = self._results(answer, 1)
         if result.status:
             function = "Instantiate" if self.fmi_version == "2.0" else "InstantiateCoSimulation"
@@ -106,10 +106,11 @@ class RemoteInstance2(_Remote, Instance2):
         *,
         log: LogTail | None = None,
         wrap: Wrapper | None = None,
+        waits: bool = False,
         reuse: bool = False,
     ) -> None:
         self._take(server, name)
-        super().__init__(fmu, name, log=log, wrap=wrap)
+        super().__init__(fmu, name, log=log, wrap=wrap, waits=waits)
 
 
 class RemoteInstance3(_Remote, Instance3):
@@ -123,8 +124,10 @@ class RemoteInstance3(_Remote, Instance3):
         *,
         event_mode: bool = False,
         early_return: bool = False,
+        updates: bool = False,
         log: LogTail | None = None,
         wrap: Wrapper | None = None,
     ) -> None:
         self._take(server, name)
+        self._updates = updates
         super().__init__(fmu, name, event_mode=event_mode, early_return=early_return, log=log, wrap=wrap)

@@ -50,6 +50,8 @@ INSTANTIATE = "Instantiate"
 #: Codes of the scalar arguments and results of a function: d double, i int, ? bool.
 SCALARS: Mapping[str, Mapping[str, tuple[str, str]]] = {
     "3.0": {
+        "EnterConfigurationMode": ("", ""),
+        "ExitConfigurationMode": ("", ""),
         "EnterInitializationMode": ("?dd?d", ""),
         "ExitInitializationMode": ("", ""),
         "EnterEventMode": ("", ""),
@@ -66,6 +68,7 @@ SCALARS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "Terminate": ("", ""),
         "Reset": ("", ""),
         "DoStep": ("ddi", ""),
+        "GetStatus": ("i", "i"),
         "GetBooleanStatus": ("i", "i"),
         "GetRealStatus": ("i", "d"),
     },

@@ -24,6 +24,8 @@ from vibroimpact.orchestrator.remote.protocol import HASH_KEY, RUN, Answer, Batc
 
 #: Longest interval at which a call under way is compared with its deadline, s.
 LOOK_SECONDS = 1.0
+#: Longest time for a server to start a process and to load the FMU there, s.
+START_SECONDS = 60.0
 
 
 class Session:
@@ -41,6 +43,7 @@ class Session:
         self._channel: Any = None
         self._stream: Any = None
         self._deadline = math.inf
+        self._deadline_watch: threading.Thread | None = None
         self._is_late = False
 
     @property
@@ -61,7 +64,7 @@ class Session:
             self._requests: SimpleQueue[Any] = SimpleQueue()
             self._stream = call(iter(self._requests.get, None), metadata=metadata)
             try:
-                return self._exchanged(first)
+                return self._exchanged(first, max(START_SECONDS, server.seconds))
             except grpc.RpcError as error:
                 if is_absent(error) and time.monotonic() < end:
                     time.sleep(RETRY_SECONDS)
@@ -85,26 +88,24 @@ class Session:
             The stream has failed; it is closed.
         """
         try:
-            return self._exchanged(calls)
+            return self._exchanged(calls, self._server.seconds)
         except grpc.RpcError as error:
             raise self._failure(error, function, at) from None
 
-    def _exchanged(self, calls: Sequence[Any]) -> Any:
-        self._begin_watch()
+    def _exchanged(self, calls: Sequence[Any], seconds: float) -> Any:
+        self._begin_watch(seconds)
         try:
             self._requests.put(Batch(calls=calls))
             return next(self._stream)
         finally:
             self._deadline = math.inf
 
-    def _begin_watch(self) -> None:
+    def _begin_watch(self, seconds: float) -> None:
         """Set the deadline of the calls under way; a thread ends a stream that misses it."""
         if self._deadline_watch is None:
             self._deadline_watch = threading.Thread(target=self._look, args=(self._channel,), daemon=True)
             self._deadline_watch.start()
-        self._deadline = time.monotonic() + self._server.seconds
-
-    _deadline_watch: threading.Thread | None = None
+        self._deadline = time.monotonic() + seconds
 
     def _look(self, channel: Any) -> None:
         while self._channel is channel:
