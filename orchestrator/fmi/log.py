@@ -6,6 +6,7 @@ A component that logs a million lines costs no memory and no call into Python.
 from __future__ import annotations
 
 import ctypes
+import weakref
 
 from vibroimpact.fmus.core import core_library
 
@@ -33,6 +34,9 @@ class LogTail:
 
     def __init__(self, memory: memoryview | None = None) -> None:
         self._ring = _Ring() if memory is None else _Ring.from_buffer(memory)
+        if core_library().vi_log_ring_add(self.environment) != 0:
+            raise MemoryError
+        weakref.finalize(self, core_library().vi_log_ring_remove, self.environment).atexit = False
 
     @property
     def environment(self) -> ctypes.c_void_p:
