@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import weakref
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
@@ -36,13 +37,15 @@ class LogTail:
         `RING_SIZE` writable bytes, such as shared memory; None: memory of its own.
     """
 
-    def __init__(self, memory: memoryview | ctypes.Array[ctypes.c_char] | None = None) -> None:
+    def __init__(self, memory: memoryview | None = None) -> None:
         self._ring = _Ring() if memory is None else _Ring.from_buffer(memory)
-
-    @classmethod
-    def at(cls, address: int) -> LogTail:
-        """Return the tail that lies at an address, as `environment` gives it."""
-        return cls((ctypes.c_char * RING_SIZE).from_address(address))
+        core = _core()
+        if core is None:
+            _tails[ctypes.addressof(self._ring)] = self
+            return
+        if core.vi_log_ring_add(self.environment) != 0:
+            raise MemoryError
+        weakref.finalize(self, core.vi_log_ring_remove, self.environment).atexit = False
 
     @property
     def environment(self) -> ctypes.c_void_p:
@@ -69,19 +72,29 @@ class LogTail:
 
 @cache
 def callback(name: str) -> ctypes.c_void_p:
-    """Return the address of a callback, `fmi2`, `fmi3`, `allocate`, `free` or `update`: the core library's where it is built.
+    """Return the address of a callback: `fmi2`, `fmi3`, `allocate`, `free` or `update`.
 
-    Elsewhere (a server of FMUs in a 32-bit Python) the callback is Python's own. FMI 2.0's messages then keep their
-    percent signs, since Python cannot read the values behind them.
+    It is the core library's. Where that is not built (a server of FMUs in a 32-bit Python), it is Python's own. FMI
+    2.0's messages then keep their percent signs, since Python cannot read the values behind them.
     """
+    core = _core()
+    if core is not None:
+        return ctypes.cast(getattr(core, f"vi_log_ring_{name}"), ctypes.c_void_p)
+    _kept.append(_plain_callback(name))
+    return ctypes.cast(_kept[-1], ctypes.c_void_p)
+
+
+@cache
+def _core() -> Any:
+    """Return the core library, or None where it is not built."""
     try:
-        function = getattr(core_library(), f"vi_log_ring_{name}")
+        return core_library()
     except ComponentError:
-        function = _plain_callback(name)
-        _kept.append(function)
-    return ctypes.cast(function, ctypes.c_void_p)
+        return None
 
 
+#: The tails of this process by their addresses, for callbacks of Python's own.
+_tails: weakref.WeakValueDictionary[int, LogTail] = weakref.WeakValueDictionary()
 #: Callbacks of Python's own, which FMUs hold.
 _kept: list[Any] = []
 
@@ -97,7 +110,9 @@ def _plain_callback(name: str) -> Any:
     text, kinds = ctypes.c_char_p, {"fmi2": (ctypes.c_char_p, ctypes.c_int), "fmi3": (ctypes.c_int,)}
 
     def log(environment: int, *arguments: Any) -> None:
-        LogTail.at(environment).add([(arguments[-1] or b"").decode("utf-8", "replace")])
+        tail = _tails.get(environment)  # some FMUs pass another pointer
+        if tail is not None:
+            tail.add([(arguments[-1] or b"").decode("utf-8", "replace")])
 
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p, *kinds[name], text, text)(log)
 

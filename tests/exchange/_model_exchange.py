@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -28,7 +29,7 @@ VERSIONS = {
     "FMPy": ("2.0", "3.0"),
     "PyFMI": ("2.0", "3.0"),
     "fmusim": ("2.0", "3.0"),
-    "OMSimulator": ("2.0",),
+    "OMSimulator": ("2.0", "3.0"),
 }
 #: Distance from the end of a step, in steps, within which a row counts as that end.
 NEAR = 1e-7
@@ -60,7 +61,7 @@ def pyfmi(request: Request) -> Rows:
     options = model.simulate_options()
     options["ncp"] = request["count"]
     options["CVode_options"] |= {"rtol": request["tolerance"], "verbosity": 50}
-    options["filter"] = request["names"]
+    options["filter"] = [glob.escape(name) for name in request["names"]]
     found = model.simulate(final_time=request["step"] * request["count"], options=options)
     rows = zip(found["time"], *(found[name] for name in request["names"]), strict=True)
     return list(_at_steps(([float(value) for value in row] for row in rows), request))

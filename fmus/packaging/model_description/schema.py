@@ -35,6 +35,11 @@ _ANYWHERE = {
     *("UnitDefinitions", "TypeDefinitions", "LogCategories", "DefaultExperiment"),
     *("ModelExchange", "CoSimulation", "ScheduledExecution"),
 }
+#: Lists that need not be there: an empty one, which the schema forbids, is no list.
+_LISTS = {
+    *("Outputs", "Derivatives", "DiscreteStates", "InitialUnknowns"),
+    *("UnitDefinitions", "TypeDefinitions", "LogCategories", "SourceFiles"),
+}
 #: Rounds of validation, in each of which elements may be left out; errors that are graded one by one.
 _MOST_ROUNDS, _MOST_ERRORS = 20, 1000
 #: Number of an element's children that the schema checks at a time.
@@ -227,8 +232,14 @@ class _Amendments:
         return True
 
     def _amend_element(self, error: Any, element: Any) -> bool:
-        """Remove an element unknown to FMI; collect a misplaced one, to be put in its place at the end."""
+        """Remove an empty list or an element unknown to FMI; collect a misplaced one, put in its place at the end."""
         tag = str(element.tag)
+        if "Missing child element" in error.message and tag in _LISTS and not len(element):
+            self._findings.add(
+                Grade.remark, f"{tag}: expected a list with entries, got an empty one. Read as none."
+            )
+            element.getparent().remove(element)
+            return True
         if "This element is not expected" not in error.message or element is self._root:
             return False
         if element.getparent() is None:  # removed before

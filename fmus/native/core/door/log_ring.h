@@ -19,10 +19,19 @@ typedef struct {
     char lines[VI_LOG_LINES][VI_LOG_LENGTH];
 } vi_log_ring;
 
-/* fmi3LogMessageCallback, with the ring as instance environment. */
+/* Register a ring before a component gets it as environment; returns 0, or -1 without memory. */
+VI_DOOR int vi_log_ring_add(vi_log_ring *ring);
+
+/* Forget a ring before its memory is freed; later lines for it are dropped. */
+VI_DOOR void vi_log_ring_remove(vi_log_ring *ring);
+
+/* fmi3LogMessageCallback, with a registered ring as instance environment.
+ *
+ * A line with any other environment goes into the only ring of the process. It is dropped if there are more.
+ */
 VI_DOOR void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message);
 
-/* fmi2CallbackLogger, with the ring as component environment. */
+/* fmi2CallbackLogger, with a registered ring as component environment; others are treated likewise. */
 VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category, const char *message,
                               ...);
 

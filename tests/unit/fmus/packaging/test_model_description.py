@@ -79,6 +79,17 @@ def test_missing_unknowns_of_initialization_are_a_remark(fmi: str) -> None:
     assert "expected its unknowns of initialization, got none of output" in finding.text
 
 
+def test_sianis_empty_lists_are_no_lists() -> None:
+    outputs = '<Outputs>\n      <Unknown index="3" dependencies="2" />\n    </Outputs>'
+    empty = "<Outputs>\n\n</Outputs><Derivatives/>", "<InitialUnknowns/>"
+    found = gain2((outputs, empty[0]), (UNKNOWNS2, empty[1]))
+    without = gain2((outputs, ""), (UNKNOWNS2, ""))
+    names = "Outputs", "Derivatives", "InitialUnknowns"
+    lists = {f"{name}: expected a list with entries, got an empty one. Read as none." for name in names}
+    assert {one.text for one in found.findings if one.grade is Grade.remark} >= lists
+    assert {one for one in found.findings if one.text not in lists} == set(without.findings)
+
+
 @pytest.mark.parametrize("kind", ["Integer", "Boolean", "String"])
 def test_simulinks_outputs_without_variability_are_discrete(kind: str) -> None:
     found = gain2((f"{OUTPUT}>\n      <Real />", f'causality="output"><{kind} />'))
