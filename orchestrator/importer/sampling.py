@@ -1,8 +1,9 @@
 """Sampling recorded variables on a time grid without disturbing the steps.
 
 A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
-The run is the same, bit for bit, with and without sampling. A component without states is read at the communication
-points, with straight lines between them.
+The run is the same, bit for bit, with and without sampling. A component in model exchange is read on the motion of its
+solver, without any repeated step. Any other component without states is read at the communication points, with
+straight lines between them.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
@@ -24,6 +26,7 @@ class _Probe:
 
     def __init__(self, component: Component, columns: Sequence[tuple[int, str]]) -> None:
         self.component = component
+        self.exchange = component.instance if isinstance(component.instance, ExchangeInstance) else None
         self.groups: list[tuple[list[int], VariableGroup]] = []
         alike: dict[tuple[str, frozenset[int]], list[tuple[int, str]]] = {}
         for place, name in columns:
@@ -84,7 +87,7 @@ class Sampler:
         self._values = array("d")
         self._first, self._index, self._end = first, 0, end
         if self._importer.time >= first - self._room(first):
-            self._importer.keeps_start = True
+            self._importer.keeps_start = any(probe.exchange is None for probe in self._probes)
             self._take_now(self._importer.time)
 
     @staticmethod
@@ -112,6 +115,14 @@ class Sampler:
         for probe in self._probes:
             if not probe.component.has_states:
                 probe.read(self._start_row)
+            if probe.exchange is not None:
+                probe.exchange.points.keep_samples(self._ahead(time))
+
+    def _ahead(self, time: float) -> NDArray[np.float64]:
+        """Return the instants of samples in a step from `time`, s, which may be as long as a macro step."""
+        last = min(self._end, time + self._importer.macro_step)
+        count = int((last - self._first) * self._rate) + 1 - self._index if np.isfinite(self._first) else 0
+        return self._first + np.arange(self._index, self._index + max(0, count)) / self._rate
 
     def _after_step(self, time: float, end: float) -> None:
         inside = []
@@ -128,12 +139,32 @@ class Sampler:
         for row, instant in zip(rows, instants, strict=True):
             row[0] = instant
         for probe in self._probes:
+            if probe.exchange is not None and self._follow(probe, probe.exchange, time, end, rows):
+                continue
             if probe.component.has_states:
                 self._revisit(probe, time, instants, rows)
             else:
                 self._interpolate(probe, time, end, instants, rows)
         for row in rows:
             self._values.extend(row)
+
+    def _follow(
+        self,
+        probe: _Probe,
+        instance: ExchangeInstance,
+        time: float,
+        end: float,
+        rows: Sequence[NDArray[np.float64]],
+    ) -> bool:
+        """Read a component in model exchange at the states that the step has kept; returns whether it has them."""
+        found = instance.kept_samples(time, end)
+        if len(found) < len(rows):
+            return False
+        for row, states in zip(rows, found, strict=False):
+            instance.show(states, row[0])
+            probe.read(row)
+        instance.show(instance.states)
+        return True
 
     def _revisit(
         self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[NDArray[np.float64]]

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "door/model_exchange_watches.h"
+
 enum { OK = 0, WARNING = 1, DISCARD = 2, ERROR = 3 };
 /* Constants of CVODE. */
 enum { BDF = 2, ONE_STEP = 2, ROOT_RETURN = 2, ROOTS_FAIL = -12 };
@@ -107,6 +109,20 @@ static int set_point(vi_exchange *e, double time, const double states[])
     return status;
 }
 
+int vi_door_exchange_show(vi_exchange *e, double time, const double states[])
+{
+    return set_point(e, time, states);
+}
+
+int vi_exchange_read_watched(vi_exchange *e)
+{
+    const size_t count = (size_t)e->watched_count;
+    const vi_exchange_function call = begin_call(e, VI_EXCHANGE_GET);
+    return judged(e, VI_EXCHANGE_GET,
+                  e->version == 3 ? call.get3(e->fmu, e->watched, count, e->values, count)
+                                  : call.get2(e->fmu, e->watched, count, e->values));
+}
+
 /* ---- what CVODE calls ---- */
 
 /* The answer to CVODE after calls that ended with `status` and gave these numbers. */
@@ -142,14 +158,21 @@ static int derivatives_at(double time, void *states, void *derivatives, void *us
     return answer(e, status, VI_EXCHANGE_DERIVATIVES, rates, e->state_count);
 }
 
-static int indicators_at(double time, void *states, double *indicators, void *user)
+/* The functions whose roots end a step: event indicators, then two of each watch. */
+static int roots_at(double time, void *states, double *roots, void *user)
 {
     vi_exchange *e = user;
     int status = set_point(e, time, e->cvode->vector_data(states));
     if (status == OK) {
-        status = get_numbers(e, VI_EXCHANGE_INDICATORS, indicators, e->indicator_count);
+        status = get_numbers(e, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
     }
-    return answer(e, status, VI_EXCHANGE_INDICATORS, indicators, e->indicator_count);
+    const int found = answer(e, status, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
+    if (found != GOOD || e->watch_count == 0) {
+        return found;
+    }
+    status = vi_exchange_read_watched(e);
+    vi_exchange_watch_roots(e, roots + e->indicator_count);
+    return answer(e, status, VI_EXCHANGE_GET, e->values, e->watched_count);
 }
 
 /* CVODE's own messages are not printed: its flag says all. */
@@ -178,15 +201,18 @@ static int make_solver(vi_exchange *e)
     c->push_message(e->context, ignore_message, NULL);
     e->vector = c->make_vector(count, e->states, e->context);
     e->tolerances = c->make_vector(count, e->absolute, e->context);
+    e->point_vector = c->make_vector(count, e->point, e->context);
     e->matrix = c->make_matrix(count, count, e->context);
     e->linear = c->make_linear(e->vector, e->matrix, e->context);
     e->solver = c->create(BDF, e->context);
-    if (e->vector == NULL || e->tolerances == NULL || e->matrix == NULL || e->linear == NULL || e->solver == NULL) {
+    if (e->vector == NULL || e->tolerances == NULL || e->point_vector == NULL || e->matrix == NULL ||
+        e->linear == NULL || e->solver == NULL) {
         return solver_failed(e, 0);
     }
     int flag = c->init(e->solver, derivatives_at, e->time, e->vector);
     flag = flag != 0 ? flag : c->set_tolerances(e->solver, e->tolerance, e->tolerances);
-    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)e->indicator_count, indicators_at);
+    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)(e->indicator_count + 2 * e->watch_count), roots_at);
+    flag = flag != 0 || e->watch_count == 0 ? flag : c->set_directions(e->solver, e->directions);
     flag = flag != 0 ? flag : c->set_linear(e->solver, e->linear, e->matrix);
     flag = flag != 0 ? flag : c->set_user(e->solver, e);
     flag = flag != 0 ? flag : c->no_root_warning(e->solver);
@@ -206,6 +232,9 @@ void vi_door_exchange_end(vi_exchange *e)
     if (e->matrix != NULL) {
         c->free_matrix(e->matrix);
     }
+    if (e->point_vector != NULL) {
+        c->free_vector(e->point_vector);
+    }
     if (e->tolerances != NULL) {
         c->free_vector(e->tolerances);
     }
@@ -215,7 +244,7 @@ void vi_door_exchange_end(vi_exchange *e)
     if (e->context != NULL) {
         c->free_context(&e->context);
     }
-    e->solver = e->linear = e->matrix = e->tolerances = e->vector = e->context = NULL;
+    e->solver = e->linear = e->matrix = e->tolerances = e->vector = e->point_vector = e->context = NULL;
     e->has_begun = 0;
 }
 
@@ -343,6 +372,7 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
 {
     const vi_cvode *c = e->cvode;
     const size_t bytes = sizeof(double) * (size_t)(e->state_count > 0 ? e->state_count : 1);
+    const double before = e->time;
     memcpy(e->kept, e->states, bytes);
     for (int division = 0;; division++) {
         if (e->begins_anew) {
@@ -356,13 +386,13 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
         e->failure = OK;
         flag = flag != 0 ? flag : c->advance(e->solver, goal, e->vector, &reached, ONE_STEP);
         if (flag >= 0) {
-            *root = flag == ROOT_RETURN;
             e->time = reached;
             e->solver_steps++;
             if (division > 0) {
                 c->set_longest(e->solver, 0.0); /* none */
             }
-            return OK;
+            const int status = flag == ROOT_RETURN ? vi_exchange_judge_roots(e, before, root) : OK;
+            return status != OK ? status : vi_exchange_keep_samples(e, true);
         }
         if (e->failure != OK) { /* of the FMU: no function is called after it */
             e->reason = VI_EXCHANGE_STATUS;
@@ -388,15 +418,15 @@ static int rounding_step(vi_exchange *e, double goal)
     }
     e->time = goal;
     e->begins_anew = 1;
-    return status;
+    return status != OK ? status : vi_exchange_keep_samples(e, false);
 }
 
 static int step_towards(vi_exchange *e, double goal, bool *root)
 {
     *root = false;
-    if (e->state_count == 0 && e->indicator_count == 0) {
+    if (e->state_count == 0 && e->indicator_count == 0 && e->watch_count == 0) {
         e->time = goal;
-        return OK;
+        return vi_exchange_keep_samples(e, false);
     }
     if (goal - e->time <= SHORTEST_STEP * fmax(fabs(goal), fabs(e->time))) {
         return rounding_step(e, goal);
@@ -422,6 +452,8 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     const double target = time + size, room = SAME_INSTANT * (1.0 + fabs(time));
     *event = *ends = *early = false;
     *last_time = time;
+    e->meets = 0;
+    e->sample_count = 0;
     if (!(fabs(time - e->time) <= SAME_TIME * (1.0 + fabs(time)))) {
         return refused(e, VI_EXCHANGE_SET_TIME, VI_EXCHANGE_TIME);
     }
@@ -441,7 +473,11 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     const double goal = has_time_event ? e->next_event : fmax(target, e->time);
     int64_t steps = 0, short_steps = 0;
     e->cause = -1;
-    while (e->time < goal && !*event && !*ends) {
+    const int marked = vi_exchange_mark_watches(e);
+    if (marked != OK) {
+        return marked;
+    }
+    while (e->time < goal && !*event && !*ends && !e->meets) {
         if (steps++ == e->most_steps) {
             return refused(e, VI_EXCHANGE_DERIVATIVES, VI_EXCHANGE_STEPS);
         }
@@ -459,6 +495,7 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
         }
         status = status != OK ? status : set_point(e, e->time, e->states);
         status = status != OK ? status : complete_step(e, no_state_prior, &wants_event, ends);
+        status = status != OK ? status : vi_exchange_follow_watches(e);
         if (status != OK) {
             return status;
         }
