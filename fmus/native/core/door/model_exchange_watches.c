@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { OK = 0, ERROR = 3 };
+enum { OK = VI_EXCHANGE_OK, ERROR = VI_EXCHANGE_ERROR };
 
 /* Most halvings of a step of CVODE in search of the first meeting; then its ends are neighbouring numbers. */
 enum { MOST_HALVINGS = 100 };

@@ -4,10 +4,8 @@
 
 #include <stdbool.h>
 
-#include "door/model_exchange.h"
+#include "door/model_exchange_calls.h"
 
-/* Read the watched variables at the present point of the FMU; defined beside the other calls. */
-int vi_exchange_read_watched(vi_exchange *exchange);
 /* Set the levels of contacts for a step that begins at the present point. */
 int vi_exchange_mark_watches(vi_exchange *exchange);
 /* Write two functions of each watch: the distance from its level, and the closing speed of a contact. Each falls
