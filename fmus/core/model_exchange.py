@@ -27,6 +27,7 @@ class ExchangeCall(IntEnum):
     restore = 11
     free = 12
     set_inputs = 13
+    get_watched = 14
 
 
 class ExchangeReason(IntEnum):
@@ -50,9 +51,19 @@ class CVode(Structure):
             *("create_context", "free_context", "clear_messages", "push_message"),
             *("make_vector", "vector_data", "free_vector", "make_matrix", "free_matrix"),
             *("make_linear", "free_linear", "create", "free", "init", "begin_anew"),
-            *("set_tolerances", "set_roots", "set_linear", "set_user", "set_stop", "set_longest"),
+            *("set_tolerances", "set_roots", "set_directions", "roots_found", "motion"),
+            *("set_linear", "set_user", "set_stop", "set_longest"),
             *("no_root_warning", "set_warnings", "current_time", "advance"),
         )
+    ]
+
+
+class ExchangeWatch(Structure):
+    """A watched point of an FMU; the fields are explained in `door/model_exchange.h`."""
+
+    _fields_ = [
+        *((name, c_double) for name in ("factor", "offset", "room", "level")),
+        *((name, c_int32) for name in ("value", "rate", "direction", "is_armed")),
     ]
 
 
@@ -66,12 +77,16 @@ class Exchange(Structure):
         ("noted_call", c_void_p),
         ("numbers", c_int64 * len(ExchangeCall)),
         *((name, c_void_p) for name in ("states", "kept", "absolute", "indicators", "compared")),
+        *((name, c_void_p) for name in ("watches", "watched", "values", "roots", "directions")),
+        *((name, c_void_p) for name in ("point", "instants", "samples")),
         *((name, c_int64) for name in ("state_count", "indicator_count", "most_steps")),
+        *((name, c_int64) for name in ("watch_count", "watched_count", "instant_count", "sample_count")),
         *((name, c_int32) for name in ("most_iterations", "version", "needs_completed", "restorable")),
         *((name, c_double) for name in ("tolerance", "time", "next_event")),
         *((name, c_void_p) for name in ("context", "solver", "vector", "tolerances", "matrix", "linear")),
+        ("point_vector", c_void_p),
         *((name, c_int32) for name in ("has_begun", "in_event_mode", "ends", "begins_anew")),
-        *((name, c_int32) for name in ("inputs_changed", "nominals_changed")),
+        *((name, c_int32) for name in ("inputs_changed", "nominals_changed", "meets")),
         *((name, c_int32) for name in ("function", "reason", "solver_flag", "cause", "failure")),
         *((name, c_int64) for name in ("derivative_calls", "solver_steps")),
     ]

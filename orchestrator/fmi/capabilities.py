@@ -68,6 +68,7 @@ _COMMON = (NEEDS_TOOL, ONLY_ONCE)
 DERIVATIVE = "providesDirectionalDerivative"
 _NEVER = "no such call is made"
 _IN_LOOPS = "asked for in algebraic loops alone, and compared once with a difference"
+_AT_IMPACTS = "asked for at rigid impacts alone, and compared with a difference"
 _BY_INTERFACE = "an FMU for it alone is refused by its name"
 
 FLAGS: tuple[Flag, ...] = (
@@ -133,8 +134,8 @@ FLAGS: tuple[Flag, ...] = (
             ),
             ("canSerializeFMUstate", "2.0", _NEVER),
             ("canSerializeFMUState", "3.0", _NEVER),
-            ("providesDirectionalDerivative", "2.0", _NEVER),
-            ("providesDirectionalDerivatives", "3.0", _NEVER),
+            ("providesDirectionalDerivative", "2.0", _AT_IMPACTS),
+            ("providesDirectionalDerivatives", "3.0", _AT_IMPACTS),
             ("providesAdjointDerivatives", "3.0", _NEVER),
             ("providesPerElementDependencies", "3.0", _NEVER),
             ("providesEvaluateDiscreteStates", "3.0", _NEVER),
@@ -255,13 +256,13 @@ def capabilities_of(
     )
 
 
-def gives_derivatives(folder: Path) -> bool:
-    """Does the FMU in a folder declare directional derivatives for co-simulation?
+def gives_derivatives(folder: Path, kind: str = CO_SIMULATION) -> bool:
+    """Does the FMU in a folder declare directional derivatives for a kind, by the name of its element?
 
     FMPy does not read this flag of FMI 3.0.
     """
     root = root_of((folder / "modelDescription.xml").read_bytes(), "modelDescription.xml")
-    interface = root.find(CO_SIMULATION)
+    interface = root.find(kind)
     flags = {} if interface is None else interface.attrib
     return any(flags.get(name, "").strip() in ("true", "1") for name in (DERIVATIVE, f"{DERIVATIVE}s"))
 

@@ -31,6 +31,7 @@ from vibroimpact.orchestrator.fmi.instance2 import FMI2_CALLBACKS, Callbacks
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.variables import DTYPES, FMI2_NAMES, Setter, VariableGroup
+from vibroimpact.orchestrator.fmi.watched_points import WatchedPoints
 
 #: Most steps of CVODE in one communication step.
 MOST_STEPS = 2_000_000
@@ -39,6 +40,8 @@ EVENT_ITERATIONS = 100
 MODEL_EXCHANGE = 0
 #: Error of one step over the tolerance: the errors of many steps then stay near the tolerance.
 STEP_SHARE = 0.1
+#: The same with a contact of the run, whose impacts carry errors on into instants.
+CONTACT_SHARE = 0.01
 #: Finest relative tolerance of one step; below it errors are rounding.
 FINEST = 1e-14
 #: Functions of the C code, by the names of the calls that they replace.
@@ -84,6 +87,10 @@ class ExchangeFacts:
         Its state can be kept and restored.
     discrete : frozenset of (str, int)
         Kinds and value references of the inputs that may change at events alone.
+    derivatives : tuple of int
+        Value references of the derivatives of the states, in the order of the states.
+    gives_derivatives : bool
+        It declares directional derivatives.
     """
 
     states: int
@@ -92,6 +99,8 @@ class ExchangeFacts:
     needs_completed: bool
     restorable: bool
     discrete: frozenset[tuple[str, int]]
+    derivatives: tuple[int, ...] = ()
+    gives_derivatives: bool = False
 
 
 class ExchangeInstance(EventfulInstance):
@@ -116,11 +125,11 @@ class ExchangeInstance(EventfulInstance):
 
     event_mode = True
     may_return_early = True
-    #: FMI's names of the functions of `ExchangeCall`, up to `restore`.
+    #: FMI's names of the functions of `ExchangeCall`; inputs are set by functions of their own.
     names: ClassVar[tuple[str, ...]] = (
         *("SetTime", "SetContinuousStates", "GetContinuousStates", "Get{derivatives}", "GetEventIndicators"),
         *("GetNominalsOfContinuousStates", "CompletedIntegratorStep", "EnterEventMode", "{update}"),
-        *("EnterContinuousTimeMode", "Get{state}", "Set{state}", "Free{state}"),
+        *("EnterContinuousTimeMode", "Get{state}", "Set{state}", "Free{state}", "", "Get{real}"),
     )
     own_words: ClassVar[dict[str, str]]
 
@@ -137,6 +146,11 @@ class ExchangeInstance(EventfulInstance):
         self.facts = facts
         self._exchange = Exchange()
         self._own = c_void_p(ctypes.addressof(self._exchange))
+        self.points = WatchedPoints(self._exchange)
+        """Its watched points, and the states between its steps."""
+        self._buffers: dict[str, NDArray[np.float64]] = {}
+        self.jump_ends = False
+        """An event mode after a jump has asked for the end of the run."""
         self._kept: list[object] = []  # memory whose addresses C code holds
         self._cvode = cvode()
         self._instantiate()
@@ -158,10 +172,11 @@ class ExchangeInstance(EventfulInstance):
         exchange.version = int(self.fmi_version[0])
         exchange.most_steps, exchange.most_iterations = MOST_STEPS, EVENT_ITERATIONS
         exchange.needs_completed, exchange.restorable = self.facts.needs_completed, self.facts.restorable
-        exchange.tolerance = max(STEP_SHARE * self.facts.tolerance, FINEST)
-        self._words = [name.format(**self.own_words, state=self.state_word) for name in self.names]
+        real = self.type_names.get("Float64", "Float64")
+        self._words = [name.format(**self.own_words, state=self.state_word, real=real) for name in self.names]
         for place, word in enumerate(self._words):
-            if ExchangeCall.save <= place <= ExchangeCall.free and not self.facts.restorable:
+            is_of_states = ExchangeCall.save <= place <= ExchangeCall.free
+            if not word or (is_of_states and not self.facts.restorable):
                 continue
             exchange.calls[place] = self.address_of(word)
             exchange.numbers[place] = (
@@ -297,19 +312,21 @@ class ExchangeInstance(EventfulInstance):
     def exit_initialization(self) -> None:
         """Leave initialization mode, into event mode; numbers of states and indicators are known then."""
         super().exit_initialization()
-        exchange = self._exchange
+        exchange, self.jump_ends = self._exchange, False
         exchange.state_count, exchange.indicator_count = self._counts()
         count = max(1, exchange.state_count)
-        for name in ("states", "kept", "absolute"):
+        for name in ("states", "kept", "absolute", "point"):
             setattr(exchange, name, self._numbers(name, count))
         for name in ("indicators", "compared"):
             setattr(exchange, name, self._numbers(name, max(1, exchange.indicator_count)))
+        self.points.begin()
+        share = CONTACT_SHARE if self.points.has_contacts else STEP_SHARE
+        exchange.tolerance = max(share * self.facts.tolerance, FINEST)
         exchange_function("begin")(self._own, c_double(self.time))
 
     def _numbers(self, name: str, count: int) -> int:
-        buffer = np.zeros(count)
-        setattr(self, f"_{name}_buffer", buffer)
-        return int(buffer.ctypes.data)
+        self._buffers[name] = np.zeros(count)
+        return int(self._buffers[name].ctypes.data)
 
     def _counts(self) -> tuple[int, int]:
         return self.facts.states, self.facts.indicators
@@ -325,6 +342,55 @@ class ExchangeInstance(EventfulInstance):
         super().free()
 
     # ---- states ----
+
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """A copy of the continuous states, shape (n,)."""
+        return self._buffers["states"][: int(self._exchange.state_count)].copy()
+
+    def show(self, states: NDArray[np.float64], time: float | None = None) -> None:
+        """Let the FMU have these states, shape (n,), at a time, s (None: the present time), for a reading.
+
+        The integration stays where it is; `show(states)` brings the FMU back there.
+        """
+        at = c_double(self._exchange.time if time is None else time)
+        status = exchange_function("show")(self._own, at, c_void_p(states.ctypes.data))
+        self.check(status, self._words[ExchangeCall.set_states])
+
+    def kept_samples(self, start: float, end: float) -> NDArray[np.float64]:
+        """Return the states that the step from `start` to `end`, s, has kept, shape (instants, n).
+
+        They are none if the last step was another one: a trial, which has been taken back.
+        """
+        is_last = self._step_time.value == start and abs(self._last_time.value - end) <= self._room(end)
+        found = self.points.samples()
+        return found if is_last else found[:0]
+
+    def derivatives(self) -> NDArray[np.float64]:
+        """Return the derivatives of the states at the present point, shape (n,)."""
+        word = self._words[ExchangeCall.derivatives]
+        found = np.zeros(int(self._exchange.state_count))
+        call = self._function(word)
+        status = call(self._pointer, c_void_p(found.ctypes.data), c_size_t(found.size))
+        self.time = self._exchange.time
+        super().check(status, word)
+        return found
+
+    def jump(self, states: NDArray[np.float64]) -> None:
+        """Let the motion go on from these states, shape (n,): they are set, then an event mode follows.
+
+        States are set in continuous-time mode, the only mode that allows it.
+        """
+        self.show(np.ascontiguousarray(states))
+        self.check(self.enter_event_call(), "EnterEventMode")
+        for _ in range(EVENT_ITERATIONS):
+            self.check(self.update_call(), "UpdateDiscreteStates")
+            self.jump_ends = self.jump_ends or self.event_wants_to_end
+            if not self.needs_update.value:
+                break
+        else:
+            self.fail(self.update_word, f"expects further iterations after {EVENT_ITERATIONS} at a jump")
+        self.check(self.enter_step_call(), "EnterStepMode")
 
     def save(self, slot: c_void_p) -> None:
         """Save the FMU's state and that of its integration into `slot`."""

@@ -15,10 +15,12 @@ from weakref import WeakValueDictionary
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, LostComponentError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, shown_name, unpack
 from vibroimpact.orchestrator.fmi.capabilities import (
+    MODEL_EXCHANGE,
     NEEDED_OF_CLOCKS,
     NEEDS_TOOL,
     ONLY_ONCE,
     capabilities_of,
+    gives_derivatives,
 )
 from vibroimpact.orchestrator.fmi.exchange import (
     Exchange2,
@@ -125,7 +127,7 @@ class Component:
         self._refuse_what_it_needs()
         self.has_states = self.capabilities.restorable
         version = 3 if description.fmiVersion.startswith("3") else 2
-        self.event_mode = events and (version == 3 or exchanges) and self.capabilities.event_mode
+        self.event_mode = exchanges or (events and version == 3 and self.capabilities.event_mode)
         self.refuses_events = self.on_own_grid = False
         self.ticking: frozenset[int] | None = None
         self._clocked: list[tuple[VariableGroup, Callable[[], int], frozenset[int]]] = []
@@ -194,14 +196,12 @@ class Component:
     def _exchange(
         self, fmu: UnpackedFmu, description: ModelDescription, log: LogTail | None, wrap: Wrapper | None
     ) -> ExchangeInstance:
-        """Make an instance for model exchange; a watched variable has no part in its integration."""
-        if not self.event_mode:
-            raise ComponentError(
-                f"{self.name}: expected a watched component ([[event]]) that runs as co-simulation, got model "
-                "exchange, which locates its own events.",
-                instance=self.name,
-            )
-        facts = exchange_facts(description, self.spec.tolerance or self.capabilities.tolerance)
+        """Make an instance for model exchange."""
+        facts = exchange_facts(
+            description,
+            self.spec.tolerance or self.capabilities.tolerance,
+            gives_derivatives=gives_derivatives(fmu.folder, MODEL_EXCHANGE),
+        )
         fmu = replace(fmu, identifiers=(description.modelExchange.modelIdentifier,))
         made = Exchange3 if fmu.fmi_version.startswith("3") else Exchange2
         try:
@@ -438,7 +438,9 @@ def kind_that_runs(spec: ComponentSpec, description: ModelDescription) -> Kind:
     raise ComponentFileError(f"{shown_name(spec.fmu)}: expected an FMU with {wanted}, got {got} only.")
 
 
-def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeFacts:
+def exchange_facts(
+    description: ModelDescription, tolerance: float, *, gives_derivatives: bool = False
+) -> ExchangeFacts:
     """Return the facts of an FMU for model exchange, with the relative tolerance of its solver."""
     interface = description.modelExchange
     inputs = [v for v in description.modelVariables if v.causality == "input"]
@@ -449,6 +451,10 @@ def exchange_facts(description: ModelDescription, tolerance: float) -> ExchangeF
         needs_completed=bool(interface.needsCompletedIntegratorStep),
         restorable=bool(interface.canGetAndSetFMUstate),
         discrete=frozenset((kind_of(v), v.valueReference) for v in inputs if v.variability != "continuous"),
+        derivatives=tuple(
+            u.variable.valueReference for u in description.derivatives if u.variable is not None
+        ),
+        gives_derivatives=gives_derivatives,
     )
 
 

@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import (
     STIFFNESS,
     ContactBond,
 )
-from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInputs
 from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
@@ -53,7 +53,7 @@ class ContactBonds:
             if _is_contact_force(components[c.target[0]], c.target[1])
         ]
         """Contacts of a body's contact port, which follows the force and slopes of a stop."""
-        inputs: dict[tuple[str, str], ForceInput] = {}
+        inputs: ForceInputs = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
         """Contacts of any other body, which holds a force over a step."""
         self.pairs = Pairs(components, pairs, inputs)
@@ -178,18 +178,18 @@ def _refuse_model_exchange(
     contacts: Sequence[StopContactSpec],
     pairs: Sequence[PairSpec],
 ) -> None:
-    """Raise ComponentError for a part of a contact that runs as model exchange."""
+    """Raise ComponentError for a stop, or a contact port, that runs as model exchange."""
     forces = [c for c in connections if _is_contact_force(components[c.target[0]], c.target[1])]
-    points = [point for pair in pairs for point in (pair.lower, pair.upper)]
+    ports = [end for pair in pairs for end in (pair.lower, pair.upper) if not isinstance(end, BodyPoint)]
     names = [
         *(name for c in forces for name in (c.source[0], c.target[0])),
-        *(name for c in contacts for name in (c.body, c.stop)),
-        *(point.component if isinstance(point, BodyPoint) else point[0] for point in points),
+        *(c.stop for c in contacts),
+        *(port[0] for port in ports),
     ]
     for name in names:
         if components[name].kind == "model_exchange":
             raise ComponentError(
-                f"{name}: expected a component that runs as co-simulation in a contact, got model exchange: impacts "
-                "and contact forces of other components are not available for its integration in this version.",
+                f"{name}: expected a stop or a contact port that runs as co-simulation, got model exchange, "
+                "which has no laws of other components.",
                 instance=name,
             )

@@ -293,6 +293,7 @@ class Importer:
             self.on_pause()
         if self.contacts.pairs:
             self._note(self.contacts.pairs.resolve(end))
+            self.wants_to_end = self.wants_to_end or self.contacts.pairs.pulses.wants_to_end
         self._tune(end)
 
     def _prepare(self, time: float) -> None:
@@ -396,6 +397,8 @@ class Importer:
     def _step_one(self, component: Component, time: float, target: float, made: Made | None = None) -> float:
         """Step one component, or take the step it has made; returns the time of its first event, or `target`."""
         instance = component.instance
+        if not component.has_states and time < target == instance.time:  # it cannot go back, and is there
+            return self._after_step(component, target) if instance.is_flagged else target
         status = instance.step(time, target - time) if made is None else instance.take_step(made.status)
         if status == DISCARD:
             instance.check(status, "DoStep")

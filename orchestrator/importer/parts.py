@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.importer.feedthrough import order_of
 from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
 from vibroimpact.orchestrator.importer.order import stepping_order
 from vibroimpact.orchestrator.importer.own_grid import Divisions, OwnGrids, cut_components
-from vibroimpact.orchestrator.importer.revision import Watch
+from vibroimpact.orchestrator.importer.revision import Watch, watch_of
 from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
     ConnectionSpec,
@@ -75,7 +75,7 @@ def parts_of(
         for component in named.values():
             component.free()
         raise
-    watches = [Watch(named[event.component], event) for event in events]
+    watches = [watch for event in events if (watch := watch_of(named[event.component], event))]
     connections = [*connections, *(c for contact in contacts for c in contact.connections)]
     clocks = [c for c in connections if joins_clocks(c, named)]
     tuned = [c for c in connections if is_tunable(c, named)]
@@ -92,7 +92,7 @@ def parts_of(
         ticks=Ticks(named.values(), clocks),
         contacts=ContactBonds(named, transfers, connections, contacts, pairs, contact_steps),
     )
-    fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]
+    fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts if c.force)]
     for name, component in named.items():
         component.watch_inputs(variable for owner, variable in fed if owner == name)
     return parts

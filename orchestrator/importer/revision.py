@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import EventSpec
 
@@ -135,6 +136,15 @@ class Watch:
         self.component.revisit_start()
         self.component.instance.step_undiscarded(time, u)
         return self.distance()
+
+
+def watch_of(component: Component, event: EventSpec) -> Watch | None:
+    """Return the watch of a component's variable; None in model exchange, whose integration finds the crossing."""
+    if not isinstance(component.instance, ExchangeInstance):
+        return Watch(component, event)
+    reference = component.variables[event.variable].valueReference
+    component.instance.points.level(reference, event.direction, event.level)
+    return None
 
 
 def refine(bracket: Bracket, value: Callable[[float], float], precision: float) -> float:

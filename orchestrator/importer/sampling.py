@@ -1,9 +1,10 @@
 """Sampling recorded variables on a time grid without disturbing the steps.
 
 A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
-The run is the same, bit for bit, with and without sampling. A component without states, or with one step size, is read
-at the communication points. Between them its real numbers follow straight lines, and all other values are those of the
-step's start. On a grid of its own all its values are held.
+The run is the same, bit for bit, with and without sampling. A component in model exchange is read on the motion of its
+solver, without any repeated step. A component without states, or with one step size, is read at the communication
+points. Between them its real numbers follow straight lines, and all other values are those of the step's start. On a
+grid of its own all its values are held.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
@@ -38,6 +40,7 @@ class _Probe:
         self, component: Component, columns: Sequence[tuple[int, str]], places: Sequence[tuple[int, str]]
     ) -> None:
         self.component = component
+        self.exchange = component.instance if isinstance(component.instance, ExchangeInstance) else None
         self.groups: list[tuple[list[int], VariableGroup]] = []
         alike: dict[tuple[str, frozenset[int]], list[tuple[int, str]]] = {}
         for place, name in columns:
@@ -136,7 +139,7 @@ class Sampler:
         self._kept = [[] for _ in self._formed]
         self._first, self._index, self._end = first, 0, end
         if self._importer.time >= first - self._room(first):
-            self._importer.keeps_start = True
+            self._importer.keeps_start = any(probe.exchange is None for probe in self._probes)
             self._take_now(self._importer.time)
 
     @staticmethod
@@ -173,6 +176,14 @@ class Sampler:
         for probe in self._probes:
             if not probe.is_revisited:
                 probe.read(self._start_row)
+            if probe.exchange is not None:
+                probe.exchange.points.keep_samples(self._ahead(time))
+
+    def _ahead(self, time: float) -> NDArray[np.float64]:
+        """Return the instants of samples in a step from `time`, s, which may be as long as a macro step."""
+        last = min(self._end, time + self._importer.macro_step)
+        count = int((last - self._first) * self._rate) + 1 - self._index if np.isfinite(self._first) else 0
+        return self._first + np.arange(self._index, self._index + max(0, count)) / self._rate
 
     def _after_step(self, time: float, end: float) -> None:
         inside = []
@@ -187,12 +198,27 @@ class Sampler:
     def _take_inside(self, time: float, end: float, instants: Sequence[float]) -> None:
         rows = [self._row(instant) for instant in instants]
         for probe in self._probes:
+            if probe.exchange is not None and self._follow(probe, probe.exchange, time, end, rows):
+                continue
             if probe.is_revisited:
                 self._revisit(probe, time, instants, rows)
             else:
                 self._interpolate(probe, time, end, instants, rows)
         for row in rows:
             self._keep(row)
+
+    def _follow(
+        self, probe: _Probe, instance: ExchangeInstance, time: float, end: float, rows: Sequence[_Row]
+    ) -> bool:
+        """Read a component in model exchange at the states that the step has kept; returns whether it has them."""
+        found = instance.kept_samples(time, end)
+        if len(found) < len(rows):
+            return False
+        for row, states in zip(rows, found, strict=False):
+            instance.show(states, row.numbers[0])
+            probe.read(row)
+        instance.show(instance.states)
+        return True
 
     def _revisit(self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[_Row]) -> None:
         """Read a component inside the step just made, and put it back at the step's end.

@@ -125,7 +125,8 @@ class StopContactSpec:
     body, stop : str
         The two components.
     displacement, velocity, force : str
-        Variables of the body: the motion of the contact point, and the force input that acts on it.
+        Variables of the body: the motion of the contact point, and the force input that acts on it. Force is None
+        for a body in model exchange whose velocity is a state; its stop is rigid.
     mass : float or None
         Effective mass of the contact point, kg; None: a trial step finds it.
     stop_displacement, stop_force : str
@@ -140,7 +141,7 @@ class StopContactSpec:
     body: str
     displacement: str
     velocity: str
-    force: str
+    force: str | None
     stop: str
     mass: float | None = None
     stop_displacement: str = "displacement"
@@ -156,7 +157,7 @@ class StopContactSpec:
     @property
     def name(self) -> str:
         """The name of its force, `stop.output -> body.input`."""
-        return f"{self.stop}.{self.stop_force} -> {self.body}.{self.force}"
+        return f"{self.stop}.{self.stop_force} -> {self.body}.{self.force or self.velocity}"
 
     @property
     def connections(self) -> tuple[ConnectionSpec, ...]:
@@ -176,16 +177,17 @@ class BodyPoint:
     component : str
         The body.
     displacement, velocity, force : str
-        Its variables: the motion of the point, and the input of the force on it.
-    mass : float
-        Effective mass of the point, kg: change of momentum over change of velocity.
+        Its variables: the motion of the point, and the input of the force on it (None: see `StopContactSpec`).
+    mass : float or None
+        Effective mass of the point, kg: change of momentum over change of velocity. None: the states of a body in
+        model exchange give it, for rigid impacts.
     """
 
     component: str
     displacement: str
     velocity: str
-    force: str
-    mass: float
+    force: str | None
+    mass: float | None
 
     @property
     def name(self) -> str:

@@ -77,11 +77,17 @@ class StepPlan:
         paths = [(c, moves_of(fresh[c.name]) or None) for c in together]
         # components that cannot go back wait for the last repetition
         repeats = self.iterates or bool(parts.contacts)
-        self.paths = [path for path in paths if path[0].has_states or not repeats]
-        self.stateless_paths = [path for path in paths if not path[0].has_states and repeats]
+        waiting = [path for path in paths if repeats and not self._steps_at_once(path[0])]
+        self.paths = [path for path in paths if path not in waiting]
+        self.stateless_paths = waiting
         self.event_mode = EventMode(parts.components, parts.transfers, behind)
         self._loop: PlainLoop | None = None
         self._is_plain: bool | None = None
+
+    def _steps_at_once(self, component: Component) -> bool:
+        """Does the component step with the others: can it go back, or does it find its own impacts at a stop?"""
+        found = [bond.body for bond in self._parts.contacts.held if bond.body.kind == "model_exchange"]
+        return component.has_states or (component in found and not self.iterates)
 
     def keep_up(self) -> None:
         """Plan the moves again if initialization has found algebraic loops that no list declares, or no longer has."""

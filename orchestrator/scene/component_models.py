@@ -136,7 +136,8 @@ class EventTable(SceneTable):
         _Text,
         replace(
             _VARIABLE_RULE,
-            doc="a continuous real variable of an FMU that can restore its state (`canGetAndSetFMUState`)",
+            doc="a continuous real variable of an FMU that can restore its state (`canGetAndSetFMUState`), or runs as "
+            "model exchange",
         ),
     ]
     direction: Annotated[
@@ -161,14 +162,22 @@ class StopContactTable(SceneTable):
         _Text, _name_of("an output of the body: the displacement of its contact point", "x")
     ]
     velocity: Annotated[_Text, _name_of("an output of the body: the velocity of that point", "v")]
-    force: Annotated[_Text, _name_of("an input of the body: the force on that point", "f")]
+    force: Annotated[
+        _Text | None,
+        replace(
+            _name_of("an input of the body: the force on that point", "f"),
+            default="none: the velocity of a body in model exchange is a continuous state; its stop is rigid. "
+            "Required of other bodies",
+        ),
+    ] = None
     mass: Annotated[
         Positive | None,
         Rule(
             unit="kg",
             doc="effective mass of the contact point, within 5 % of the mass that a trial step finds; it sets the "
             "length of the steps in a contact",
-            default="found by a trial step; required for a body that cannot restore its state",
+            default="found by a trial step, in model exchange by the states; required for another body that cannot "
+            "restore its state",
         ),
     ] = None
     stop: Annotated[
@@ -215,8 +224,13 @@ class BodyPointTable(SceneTable):
     velocity: Annotated[_Text, _name_of("an output of the body: the velocity of that point", "v")]
     force: Annotated[_Text, _name_of("an input of the body: the force on that point", "f")]
     mass: Annotated[
-        Positive, Rule(unit="kg", doc="effective mass of the point, within 5 % of a trial step's mass")
-    ]
+        Positive | None,
+        Rule(
+            unit="kg",
+            doc="effective mass of the point, within 5 % of a trial step's mass",
+            default="found by the states of a body in model exchange, for the law restitution; else required",
+        ),
+    ] = None
 
 
 class PairTable(SceneTable):

@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.pairs.ends import Scale, end_of
 from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.specification import PairSpec
-from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInputs
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
 
 #: Most impulses at one instant; more are an error.
@@ -28,7 +28,7 @@ class Pairs:
         self,
         components: Mapping[str, Component],
         specs: Sequence[PairSpec],
-        inputs: dict[tuple[str, str], ForceInput],
+        inputs: ForceInputs,
     ) -> None:
         self.scale = Scale()
         """Largest displacement and speed of all pairs, by which others are small."""

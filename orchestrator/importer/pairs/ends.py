@@ -6,13 +6,19 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.revision import PRECISION
 from vibroimpact.orchestrator.importer.specification import BodyPoint
 from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import LOWER_SIDE
-from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps
-from vibroimpact.orchestrator.importer.stop_contacts.pulse import Pulses
+from vibroimpact.orchestrator.importer.stop_contacts.force_input import (
+    ForceInput,
+    ForceInputs,
+    TrialSteps,
+    force_input_of,
+)
+from vibroimpact.orchestrator.importer.stop_contacts.pulse import UNKNOWN_MASS, Pulses
 
 #: Factor of the touching distance: bodies touch below the way of the fastest body in this many impact precisions ...
 TOUCHING_TIMES = 64.0
@@ -41,7 +47,7 @@ class PortEnd:
         self,
         components: Mapping[str, Component],
         end: tuple[str, str],
-        inputs: dict[tuple[str, str], ForceInput],
+        inputs: ForceInputs,
     ) -> None:
         component, port = end
         self.name = f"{component}.{port}"
@@ -91,15 +97,16 @@ class PointEnd:
         self,
         components: Mapping[str, Component],
         point: BodyPoint,
-        inputs: dict[tuple[str, str], ForceInput],
+        inputs: ForceInputs,
         pulses: Pulses | None,
     ) -> None:
         self.name = point.name
         self.body = components[point.component]
-        self._given = point.mass
+        self._given = UNKNOWN_MASS if point.mass is None else point.mass
+        if isinstance(self.body.instance, ExchangeInstance):
+            self.body.instance.points.has_contacts = True
         self._motion = self.body.group("Float64", [point.displacement, point.velocity])
-        place = point.component, point.force
-        self._input = inputs.setdefault(place, ForceInput(self.body, point.force))
+        self._input = force_input_of(self.body, point.force, inputs)
         self._trials = TrialSteps(self.body, point.velocity, self._input)
         self.pulse = None if pulses is None else pulses.of(point, self._input)
         """Its impulses; None with a yielding law."""
@@ -133,14 +140,14 @@ class PointEnd:
     def look(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s); the velocity includes the impulse still to be given."""
         displacement, velocity = (float(value) for value in self._motion.get())
-        if self.pulse is not None:
+        if self.pulse is not None and self.pulse.owed:
             velocity += self.pulse.owed / self.pulse.mass
         return displacement, velocity
 
     def strike(self, impulse: float) -> None:
-        """Give the point an impulse along its displacement, N s: the body receives it in the next step."""
+        """Give the point an impulse along its displacement, N s: at once in model exchange, else in the next step."""
         assert self.pulse is not None
-        self.pulse.owed += impulse
+        self.pulse.strike(impulse)
 
     def free(self) -> None:
         """Free the states that trial steps have saved."""
@@ -182,7 +189,7 @@ PairEnd = PortEnd | PointEnd | SurfaceEnd
 def end_of(
     components: Mapping[str, Component],
     end: tuple[str, str] | BodyPoint,
-    inputs: dict[tuple[str, str], ForceInput],
+    inputs: ForceInputs,
     pulses: Pulses | None,
 ) -> PairEnd:
     """Return one end of a pair; `pulses` gives it impulses, None with a yielding law."""

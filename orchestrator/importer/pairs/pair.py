@@ -76,6 +76,15 @@ class Pair:
         self.name = spec.name
         self.lower, self.upper = lower, upper
         self._pulses = pulses
+        self._refuse_stateless()
+        self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
+        self._scale = scale
+        self.impacts = ContactImpacts()
+        # the meaning of the variables of other tools' bodies is unknown
+        self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
+        self.take(spec)
+
+    def _refuse_stateless(self) -> None:
         for end in (self.lower, self.upper):
             if not end.body.has_states:
                 raise ComponentError(
@@ -83,12 +92,6 @@ class Pair:
                     "The instant at which two bodies meet is found by going back.",
                     instance=end.body.name,
                 )
-        self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
-        self._scale = scale
-        self.impacts = ContactImpacts()
-        # the meaning of the variables of other tools' bodies is unknown
-        self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
-        self.take(spec)
 
     def take(self, spec: PairSpec) -> None:
         """Take the numbers of a specification, for the next run."""
@@ -323,16 +326,25 @@ class Pair:
         `is_first`: the bodies met by themselves, and no other impact of this instant has thrown them at each other.
         """
         restitution = 0.0 if is_first and self._accumulates(now, time) else self.restitution
+        if restitution == 0.0:
+            self._refuse_rest(time)
         impulse = (1.0 + restitution) * now.closing * self._reduced
         self.lower.strike(-impulse)
         self.upper.strike(impulse)
         if now.closing > self._scale.slow:
-            self.impacts.strike(time, now.closing, impulse, restitution)
+            self.impacts.strike(time, now.closing, self._known(impulse), restitution)
         if self._force.resting:
             self._part(now.gap)
             now = now._replace(gap=max(now.gap, 0.0))
         if restitution == 0.0:
             self._force.rest(now.gap)
+
+    def _known(self, impulse: float) -> float:
+        """Return an impulse, N s; NaN where its size is unknown."""
+        return impulse
+
+    def _refuse_rest(self, time: float) -> None:
+        """Raise ComponentError for bodies that cannot be held on each other."""
 
     def _part(self, gap: float) -> None:
         """Part bodies that have rested on each other, at their present gap."""

@@ -32,15 +32,25 @@ class ForceInput:
     `parts` holds the force of each contact along the displacement, N.
     """
 
-    def __init__(self, body: Component, name: str) -> None:
-        self._group = body.group("Float64", [name])
-        self.name = name
+    def __init__(self, body: Component, name: str | None) -> None:
+        self._group = None if name is None else body.group("Float64", [name])
+        self.name = name or "none"
         self.parts: dict[str, float] = {}
 
     def write(self, more: float = 0.0) -> None:
-        """Write the sum of the parts, plus `more` N, to the body."""
-        self._group.values[0] = sum(self.parts.values()) + more
-        self._group.set()
+        """Write the sum of the parts, plus `more` N, to the body; a body without a force input gets none."""
+        if self._group is not None:
+            self._group.values[0] = sum(self.parts.values()) + more
+            self._group.set()
+
+
+#: Force inputs by component and name; a body without a force input has one of the name None.
+ForceInputs = dict[tuple[str, str | None], ForceInput]
+
+
+def force_input_of(body: Component, name: str | None, inputs: ForceInputs) -> ForceInput:
+    """Return the force input of this name, which all its contacts share; None: no input."""
+    return inputs.setdefault((body.name, name), ForceInput(body, name))
 
 
 class TrialSteps:

@@ -20,6 +20,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
+from vibroimpact.orchestrator.fmi.watched_points import ContactWatch
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
@@ -32,8 +34,9 @@ from vibroimpact.orchestrator.importer.stop_contacts.asked_stop import (
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import (
     OWN_STEPS,
     TRIAL_STEP,
-    ForceInput,
+    ForceInputs,
     TrialSteps,
+    force_input_of,
 )
 from vibroimpact.orchestrator.importer.stop_contacts.pulse import PART
 from vibroimpact.orchestrator.importer.stop_contacts.step_path import NODES, StepPath, last_true
@@ -79,15 +82,17 @@ class HeldForceBond:
         self,
         components: Mapping[str, Component],
         spec: StopContactSpec,
-        inputs: dict[tuple[str, str], ForceInput],
+        inputs: ForceInputs,
     ) -> None:
         self.name = spec.name
         self.body = components[spec.body]
         self.contact = spec
         self.stop = AskedStop(components[spec.stop], spec)
         self._outputs = self.body.group("Float64", [spec.displacement, spec.velocity])
-        self._input = inputs.setdefault((spec.body, spec.force), ForceInput(self.body, spec.force))
+        self._input = force_input_of(self.body, spec.force, inputs)
         self._trials = TrialSteps(self.body, spec.velocity, self._input)
+        self.watch = _watch_of(self.body, spec)
+        """Model exchange: the watch that ends steps where the body meets a rigid stop."""
         self.revisable = self.body.has_states
         """Its steps can be repeated."""
         self.given_mass = spec.mass
@@ -98,8 +103,12 @@ class HeldForceBond:
         """Energy that the body received beyond the law of the stop, J."""
 
     def begin(self) -> None:
-        """Start a run: the parameters are set."""
+        """Start a run: the parameters are set.
+
+        ComponentError: a stop that yields, for a body that cannot be pressed or repeat its steps.
+        """
         self.stop.begin()
+        self._refuse_yielding()
         self.impacts.forget()
         self._input.parts[self.contact.stop] = 0.0
         self.mass = self.given_mass
@@ -115,6 +124,17 @@ class HeldForceBond:
         self._depth: float | None = None
         self._limit = math.inf
         self._largest = 0.0
+
+    def _refuse_yielding(self) -> None:
+        exchanges = self.body.kind == "model_exchange"
+        lacks = "a force input" if self.contact.force is None else "canGetAndSetFMUState"
+        if self.stop.is_rigid or not exchanges or (self.contact.force is not None and self.revisable):
+            return
+        raise ComponentError(
+            f"{self.contact.stop}: expected a rigid stop (the law restitution) for {self.body.name}, which runs as "
+            f"model exchange without {lacks}, got a stop that yields.",
+            instance=self.contact.stop,
+        )
 
     # ---- a step ----
 
@@ -458,6 +478,15 @@ class HeldForceBond:
         """Free its saved states, before its components are freed."""
         self.stop.free()
         self._trials.free()
+
+
+def _watch_of(body: Component, spec: StopContactSpec) -> ContactWatch | None:
+    """Return a watch of the contact point of a body in model exchange; None for another body."""
+    if not isinstance(body.instance, ExchangeInstance):
+        return None
+    body.instance.points.has_contacts = True
+    names = spec.displacement, spec.velocity
+    return body.instance.points.contact(*(body.variables[name].valueReference for name in names))
 
 
 def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:

@@ -61,7 +61,7 @@ class PlainContact:
         self._stop = AskedStop(components[spec.stop], spec)
         body = self._body = components[spec.body]
         self._motion = body.group("Float64", [spec.displacement, spec.velocity])
-        self._applied = body.group("Float64", [spec.force])
+        self._applied = body.group("Float64", [connection.target[1]])
         self._yields = False
         self.begin(connection.gain)
 

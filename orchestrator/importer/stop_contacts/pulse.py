@@ -15,6 +15,7 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import BodyPoint
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInput, TrialSteps, agrees
+from vibroimpact.orchestrator.importer.stop_contacts.state_jump import StateImpulse, StateVelocity
 
 #: Shortest pulse, s, and in units in the last place of the time; powers of 2, so that its end is a binary number.
 SHORTEST, SHORTEST_ULPS = 2.0**-39, 64.0
@@ -47,7 +48,13 @@ class Pulse:
         self._input = force
         self.given: float | None = point.mass
         self._name = f"{point.component}.{point.force}"
-        self.owed, self.mass, self.ready = 0.0, point.mass, False
+        self.owed, self.mass, self.ready = 0.0, point.mass or UNKNOWN_MASS, False
+
+    knows_mass, wants_to_end = True, False
+
+    def strike(self, impulse: float) -> None:
+        """Owe the point an impulse along its displacement, N s: the body receives it in the next step."""
+        self.owed += impulse
 
     def begin(self, time: float) -> None:
         """Start a run: find the shortest pulse that the body answers.
@@ -146,6 +153,16 @@ class Pulse:
         self._trials.free()
 
 
+Impulse = Pulse | StateImpulse | StateVelocity
+
+
+def _impulse_of(body: Component, point: BodyPoint, force: ForceInput) -> Impulse:
+    """Return the impulses of a point: jumps of the states in model exchange, else pulses."""
+    if body.kind != "model_exchange":
+        return Pulse(body, point, force)
+    return StateVelocity(body, point) if point.force is None else StateImpulse(body, point, force)
+
+
 class Pulses:
     """The impulses of all points of bodies that take only forces.
 
@@ -157,20 +174,27 @@ class Pulses:
 
     def __init__(self, components: Mapping[str, Component]) -> None:
         self._components = components
-        self._pulses: dict[tuple[str, str], Pulse] = {}
+        self._pulses: dict[tuple[str, str], Impulse] = {}
         self._held: list[Pulse] = []
         self.under_way = False
 
-    def of(self, point: BodyPoint, force: ForceInput) -> Pulse:
+    def of(self, point: BodyPoint, force: ForceInput) -> Impulse:
         """Return the impulses of a point; pairs that hit the same point share them."""
-        pulse = Pulse(self._components[point.component], point, force)
-        return self._pulses.setdefault((point.component, point.force), pulse)
+        pulse = _impulse_of(self._components[point.component], point, force)
+        return self._pulses.setdefault((point.component, point.force or point.velocity), pulse)
+
+    @property
+    def wants_to_end(self) -> bool:
+        """Does a component that got an impulse ask for the end of the run?"""
+        return any(pulse.wants_to_end for pulse in self._pulses.values())
 
     def begin(self) -> None:
         """Start a run; each point begins its own."""
         self.under_way, self._held = False, []
         for pulse in self._pulses.values():
-            pulse.owed, pulse.ready = 0.0, False
+            pulse.ready = False
+            if isinstance(pulse, Pulse):
+                pulse.owed = 0.0
 
     def measure(self, time: float) -> None:
         """Measure the masses of the run, before an impact."""
@@ -180,7 +204,7 @@ class Pulses:
 
     def begin_step(self, time: float, target: float) -> float:
         """Hold the forces of the owed impulses; returns where the step should end, s."""
-        self._held = [pulse for pulse in self._pulses.values() if pulse.owed]
+        self._held = [pulse for pulse in self._pulses.values() if isinstance(pulse, Pulse) and pulse.owed]
         self.under_way = bool(self._held)
         if not self.under_way:
             return target
@@ -198,7 +222,8 @@ class Pulses:
     def free(self) -> None:
         """Free their saved states, before the bodies are freed."""
         for pulse in self._pulses.values():
-            pulse.free()
+            if isinstance(pulse, Pulse):
+                pulse.free()
 
 
 def _is_impulse(one: float, two: float) -> bool:

@@ -21,6 +21,7 @@ from vibroimpact.fmus.units import (
 )
 from vibroimpact.orchestrator.scene.array_values import MOST_ELEMENTS, shape_words
 from vibroimpact.orchestrator.scene.component_facts import (
+    MODEL_EXCHANGE,
     NUMERIC_KINDS,
     VariableFacts,
 )
@@ -257,7 +258,7 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
         if variable.kind != "real" or variable.variability != "continuous" or not variable.scalar:
             got = f"the {variable.variability} {variable.type} {event.watch}"
             yield Problem(where, "a continuous real number", got, "A crossing needs values on both sides.")
-        if not facts.restorable:
+        if not facts.restorable and facts.kind != MODEL_EXCHANGE:
             hint = "A crossing is found by going back to the state before the step."
             yield not_restorable(facts, where, hint)
         force = _contact_answer(draft, component_variable(event.watch)[0])

@@ -26,10 +26,13 @@ SIDES = {"upper": 1, "lower": 2}
 
 def contact_problems(draft: GeneralDraft) -> list[Problem]:
     """Return all problems of the contacts of a general scene."""
-    exchanged = [*_parts_are_co_simulation(draft)]
+    exchanged = [*_laws_are_co_simulation(draft)]
     if exchanged:
         return exchanged
-    rules = (_variables_are_there, _stops_answer_with_a_force, _bodies_say_their_mass, _inputs_are_free)
+    rules = (
+        *(_variables_are_there, _stops_answer_with_a_force, _bodies_take_impacts),
+        *(_bodies_say_their_mass, _inputs_are_free),
+    )
     return [
         problem
         for place, table in enumerate(draft.contacts)
@@ -39,22 +42,22 @@ def contact_problems(draft: GeneralDraft) -> list[Problem]:
     ]
 
 
-def _parts_are_co_simulation(draft: GeneralDraft) -> Iterator[Problem]:
-    """Yield a problem for each part of a contact that runs as model exchange."""
+def _laws_are_co_simulation(draft: GeneralDraft) -> Iterator[Problem]:
+    """Yield a problem for each stop, and each contact port, that runs as model exchange."""
     for place, table in enumerate(draft.contacts):
         if table is None:
             continue
         if isinstance(table, StopContactTable):
-            named = [("body", table.body), ("stop", table.stop)]
+            named = [("stop", table.stop)]
         else:
-            named = [("between", name) for name in table.between]
+            named = [("between", name) for name in table.between if name not in table.bodies]
         for key, name in named:
             facts = _facts(draft, component_variable(name)[0])
             if facts is not None and facts.kind == MODEL_EXCHANGE:
                 hint = (
                     'Write run_as = "co_simulation".'
                     if CO_SIMULATION in facts.kinds
-                    else "Its impacts and contact forces are not available in this version."
+                    else "A body of another tool is named in bodies; a stop is an FMU for co-simulation."
                 )
                 where = key_path(("contact", place, key))
                 yield Problem(
@@ -147,7 +150,8 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
         )
         yield not_restorable(facts, where, hint)
     body = _facts(draft, table.body)
-    if body is not None and not body.restorable and _is_rigid(draft, table, facts):
+    limited = body is not None and not body.restorable and body.kind != MODEL_EXCHANGE
+    if body is not None and limited and _is_rigid(draft, table, facts):
         hint = (
             f"{body.file} does not have canGetAndSetFMUState, which rigid impacts need: parameters = "
             '{ law = "kelvin_voigt", stiffness = ..., damping = ... }, hertz or hunt_crossley.'
@@ -163,6 +167,24 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
         yield Problem(key_path(("contact", place, SIDE)), '"upper" or "lower"', "nothing", hint)
 
 
+def _bodies_take_impacts(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
+    """A body in model exchange takes rigid impacts without a force input or a state that can be kept, others none."""
+    body, stop = _facts(draft, table.body), _facts(draft, table.stop)
+    if body is None or stop is None:
+        return
+    if body.kind != MODEL_EXCHANGE:
+        if table.force is None:
+            hint = "Only a body in model exchange does without: its velocity is a continuous state."
+            where = key_path(("contact", place, "force"))
+            yield Problem(where, "the name of an input of the body: the force on that point", "nothing", hint)
+        return
+    lacks = "force" if table.force is None else "" if body.restorable else "canGetAndSetFMUState"
+    if lacks and not _is_rigid(draft, table, stop) and not _sweeps_law(draft, table):
+        got = f"{table.stop}, which yields, for {table.body} in model exchange without {lacks}"
+        hint = 'Give the stop parameters = { law = "restitution", restitution = ... }.'
+        yield Problem(key_path(("contact", place, "stop")), "a rigid stop", got, hint)
+
+
 def _says_its_side(facts: ComponentFacts) -> bool:
     """Return whether a stop has a parameter `side` like an ImpactStop (upper 1, lower 2), also in a lean export."""
     side = facts.variables.get(SIDE)
@@ -176,17 +198,23 @@ def _is_rigid(draft: GeneralDraft, table: StopContactTable, facts: ComponentFact
     law = facts.variables.get(LAW)
     if law is None or "applied_restitution" not in facts.variables:
         return False
-    swept = draft.document.get("sweep")
-    if isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept:
+    if _sweeps_law(draft, table):
         return False  # each point has its own law
     default = contact_law("restitution").number
     return (draft.components[table.stop].parameters or {}).get(LAW, default) in rigid_law_numbers()
+
+
+def _sweeps_law(draft: GeneralDraft, table: StopContactTable) -> bool:
+    swept = draft.document.get("sweep")
+    return isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept
 
 
 def _bodies_say_their_mass(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
     facts = _facts(draft, table.body)
     if facts is None or facts.restorable or table.mass is not None or _sweeps_mass(draft, place):
         return
+    if facts.kind == MODEL_EXCHANGE:
+        return  # its states give the mass
     hint = f"{facts.file} does not have canGetAndSetFMUState, and no trial step can find it."
     yield Problem(key_path(("contact", place, "mass")), "the effective mass, a number > 0", "nothing", hint)
 

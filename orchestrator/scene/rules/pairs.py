@@ -10,8 +10,13 @@ from functools import partial
 from vibroimpact.fmus.core.contact_laws import contact_law
 from vibroimpact.fmus.units import parse_unit
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
-from vibroimpact.orchestrator.scene.component_facts import ComponentFacts, StartValue
-from vibroimpact.orchestrator.scene.component_models import BodyPair, BodyPointTable, PairTable
+from vibroimpact.orchestrator.scene.component_facts import MODEL_EXCHANGE, ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.component_models import (
+    BodyPair,
+    BodyPointTable,
+    PairTable,
+    RestitutionPair,
+)
 from vibroimpact.orchestrator.scene.component_numbers import component_variable
 from vibroimpact.orchestrator.scene.components import DraftComponent, GeneralDraft, not_restorable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -61,7 +66,10 @@ def plan_ports(draft: GeneralDraft) -> PortPlan:
         plan.problems += _unused_points(points, table.between, place)
         for end, point in enumerate(table.between):
             if point in points:
-                plan.problems += _foreign_point_problems(draft, place, point, points[point])
+                is_rigid = isinstance(table, RestitutionPair)
+                plan.problems += _foreign_point_problems(
+                    draft, place, point, points[point], is_rigid=is_rigid
+                )
                 plan.ends[place, end] = BodyPoint(component=point, **points[point].model_dump())
                 continue
             found = _port_of(draft, point, key_path(("contact", place, "between", end)), taken, plan)
@@ -80,7 +88,7 @@ def _unused_points(
 
 
 def _foreign_point_problems(
-    draft: GeneralDraft, place: int, name: str, point: BodyPointTable
+    draft: GeneralDraft, place: int, name: str, point: BodyPointTable, *, is_rigid: bool
 ) -> Iterator[Problem]:
     """Yield the problems of a point on a body of another tool."""
     component = draft.components.get(name)
@@ -102,6 +110,10 @@ def _foreign_point_problems(
         where = key_path(("contact", place, "bodies", name, key))
         compared = None if draft.is_nondimensional else unit
         yield from variable_problems(where, name, facts, getattr(point, key), causality, compared)
+    if point.mass is None and not (facts.kind == MODEL_EXCHANGE and is_rigid):
+        hint = "Only a body in model exchange gives it by its states, for the law restitution."
+        where = key_path(("contact", place, "bodies", name, "mass"))
+        yield Problem(where, "the effective mass, a number > 0", "nothing", hint)
     if not facts.restorable:
         hint = "The instant at which two bodies meet is found by going back."
         yield not_restorable(facts, key_path(("contact", place, "bodies", name)), hint)

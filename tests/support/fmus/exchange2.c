@@ -192,6 +192,17 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], s
     return fmi2OK;
 }
 
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t unknown_count,
+                                        const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
+                                        fmi2Real sensitivity[])
+{
+    (void)known_count;
+    for (size_t i = 0; i < unknown_count; i++) {
+        sensitivity[i] = unknowns[i] == V_RATE && knowns[0] == U ? seed[0] * exchanged_slope(of(c)) : 0.0;
+    }
+    return fmi2OK;
+}
+
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Integer values[])
 {
     (void)references, (void)count;

@@ -204,6 +204,17 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[],
     return fmi3OK;
 }
 
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
+                                        const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
+                                        size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count)
+{
+    (void)known_count, (void)seed_count, (void)sensitivity_count;
+    for (size_t i = 0; i < unknown_count; i++) {
+        sensitivity[i] = unknowns[i] == V_RATE && knowns[0] == U ? seed[0] * exchanged_slope(of(c)) : 0.0;
+    }
+    return fmi3OK;
+}
+
 fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3Int64 values[],
                         size_t value_count)
 {

@@ -4,7 +4,7 @@
 #include <string.h>
 
 enum { TIME = 0 };
-static const double GRAVITY = 9.81, RESTITUTION = 0.8, MILLION = 1e6, ROOM = 1e-9;
+static const double GRAVITY = 9.81, RESTITUTION = 0.8, MILLION = 1e6, ROOM = 1e-9, MOST_FORCE = 1e3;
 
 void exchanged_start(exchanged *m)
 {
@@ -49,6 +49,10 @@ answer exchanged_rates(exchanged *m, double rates[2])
     case BALL: rates[1] = -GRAVITY; return ANSWER_OK;
     case STAIRS: rates[1] = 0.0; return ANSWER_OK;
     case CLOCKED: rates[1] = 0.0; return m->is_lit || m->real[TIME] > m->fuse + ROOM ? ANSWER_ERROR : ANSWER_OK;
+    case LAST_FALL:
+    case FALLING: rates[1] = m->real[U] / m->real[AT] - GRAVITY; return ANSWER_OK;
+    case PENDULUM: rates[1] = m->real[U] * cos(m->real[X]) - GRAVITY * sin(m->real[X]); return ANSWER_OK;
+    case WEAK: rates[1] = fmax(-MOST_FORCE, fmin(MOST_FORCE, m->real[U])) - m->real[X]; return ANSWER_OK;
     case SHORT_RATES: return is_far(m) ? ANSWER_DISCARD : ANSWER_OK;
     case NAN_RATES: rates[1] = is_far(m) ? (double)NAN : rates[1]; return ANSWER_OK;
     case RATES_FAIL: return is_late ? ANSWER_ERROR : ANSWER_OK;
@@ -138,6 +142,7 @@ answer exchanged_update(exchanged *m, decisions *made)
     } else if (m->settled && kind == SPRING && m->real[U] > 10.0) {
         m->real[COUNT] += 1.0;
     }
+    made->ends = m->settled && kind == LAST_FALL && m->real[V] > 0.0;
     const bool ticks = kind == STAIRS || kind == ENDS_AT_EVENT || kind == RESCALED || kind == ENDLESS || kind == STUCK;
     if (ticks && !m->settled) {
         m->next = m->real[AT];
@@ -172,7 +177,20 @@ bool exchanged_set_real(exchanged *m, unsigned reference, double value)
     return true;
 }
 
+double exchanged_slope(const exchanged *m)
+{
+    switch (kind_of(m)) {
+    case FALLING: return 1.0 / m->real[AT];
+    case PENDULUM: return cos(m->real[X]);
+    case SHORT_RATES: return 2.0;
+    default: return 1.0;
+    }
+}
+
 double exchanged_real(const exchanged *m, unsigned reference)
 {
+    if (reference == TIP || reference == TIP_RATE) {
+        return reference == TIP ? sin(m->real[X]) : cos(m->real[X]) * m->real[V];
+    }
     return reference < REALS ? m->real[reference] : (double)NAN;
 }

@@ -9,7 +9,7 @@
 enum { TICK = 40, FUSE };
 
 /* Value references; 0 is the time. */
-enum { X = 1, V, U, COUNT, KIND, AT, STEPS, NOMINALS, REALS, D = 20 };
+enum { X = 1, V, U, COUNT, KIND, AT, STEPS, NOMINALS, TIP, TIP_RATE, REALS, D = 20, X_RATE = 30, V_RATE };
 
 /* Values of `kind`. */
 enum {
@@ -30,6 +30,10 @@ enum {
     STUCK,            /* a time event at the present time, again and again */
     RATES_FATAL,      /* fatal error of the derivatives from `at` on */
     CLOCKED,          /* clocks: each tick adds 1 to v; a countdown of `at`, lit by the third, stops the mass */
+    FALLING,          /* a mass of `at` kg under gravity and the force u */
+    PENDULUM, /* of 1 kg and 1 m: x is its angle; u pushes its tip along `tip`, the way of the tip to one side */
+    WEAK, /* takes forces of 1000 N at most */
+    LAST_FALL, /* falls, and asks for the end in the event mode after its first impact from outside */
     KINDS
 };
 
@@ -63,6 +67,8 @@ answer exchanged_update(exchanged *m, decisions *made);
 bool exchanged_tick(exchanged *m, unsigned clock);
 bool exchanged_set_d(exchanged *m, int d);
 bool exchanged_set_real(exchanged *m, unsigned reference, double value);
+/* d(der(v))/du: the derivative of der(x) is 0. Of SHORT_RATES it is false. */
+double exchanged_slope(const exchanged *m);
 /* NAN for an unknown reference. */
 double exchanged_real(const exchanged *m, unsigned reference);
 #endif

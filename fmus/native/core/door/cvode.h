@@ -27,6 +27,9 @@ typedef struct {
     int (*begin_anew)(void *, double, void *);
     int (*set_tolerances)(void *, double, void *);
     int (*set_roots)(void *, int, vi_cvode_roots);
+    int (*set_directions)(void *, int *);
+    int (*roots_found)(void *, int *);
+    int (*motion)(void *, double, int, void *);
     int (*set_linear)(void *, void *, void *);
     int (*set_user)(void *, void *);
     int (*set_stop)(void *, double);

@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OK = 0, WARNING = 1, DISCARD = 2, ERROR = 3 };
+#include "door/model_exchange_watches.h"
+
+enum { OK = VI_EXCHANGE_OK, DISCARD = VI_EXCHANGE_DISCARD, ERROR = VI_EXCHANGE_ERROR };
 /* Constants of CVODE. */
 enum { BDF = 2, ONE_STEP = 2, ROOT_RETURN = 2, ROOTS_FAIL = -12 };
 /* Answers of a function to CVODE. */
@@ -36,56 +38,6 @@ typedef struct {
     double numbers[]; /* states, then event indicators */
 } saved_state;
 
-static bool is_bad(int status)
-{
-    return status != OK && status != WARNING;
-}
-
-/* ---- calls ---- */
-
-static void note(const vi_exchange *e, int64_t number)
-{
-    if (e->noted_call != NULL) {
-        *e->noted_call = number;
-    }
-}
-
-static vi_exchange_function begin_call(const vi_exchange *e, int function)
-{
-    note(e, e->numbers[function]);
-    return e->calls[function];
-}
-
-static int judged(vi_exchange *e, int function, int status)
-{
-    if (is_bad(status)) {
-        e->function = function;
-        e->reason = VI_EXCHANGE_STATUS;
-        return status;
-    }
-    return OK;
-}
-
-static int refused(vi_exchange *e, int function, int reason)
-{
-    e->function = function;
-    e->reason = reason;
-    return ERROR;
-}
-
-static int call_plain(vi_exchange *e, int function)
-{
-    return judged(e, function, begin_call(e, function).plain(e->fmu));
-}
-
-static int get_numbers(vi_exchange *e, int function, double numbers[], int64_t count)
-{
-    if (count == 0) {
-        return OK;
-    }
-    return judged(e, function, begin_call(e, function).get_numbers(e->fmu, numbers, (size_t)count));
-}
-
 static bool are_finite(const double numbers[], int64_t count)
 {
     for (int64_t i = 0; i < count; i++) {
@@ -94,17 +46,6 @@ static bool are_finite(const double numbers[], int64_t count)
         }
     }
     return true;
-}
-
-static int set_point(vi_exchange *e, double time, const double states[])
-{
-    int status = judged(e, VI_EXCHANGE_SET_TIME, begin_call(e, VI_EXCHANGE_SET_TIME).set_time(e->fmu, time));
-    if (status == OK && e->state_count > 0) {
-        const size_t count = (size_t)e->state_count;
-        status = judged(e, VI_EXCHANGE_SET_STATES,
-                        begin_call(e, VI_EXCHANGE_SET_STATES).set_numbers(e->fmu, states, count));
-    }
-    return status;
 }
 
 /* ---- what CVODE calls ---- */
@@ -116,7 +57,7 @@ static int answer(vi_exchange *e, int status, int function, const double numbers
         return GOOD;
     }
     if (status == OK) {
-        refused(e, function, VI_EXCHANGE_NOT_FINITE);
+        vi_exchange_refused(e, function, VI_EXCHANGE_NOT_FINITE);
     }
     e->cause = e->function;
     if (status == OK || status == DISCARD) {
@@ -130,26 +71,33 @@ static int derivatives_at(double time, void *states, void *derivatives, void *us
 {
     vi_exchange *e = user;
     double *rates = e->cvode->vector_data(derivatives);
-    int status = set_point(e, time, e->cvode->vector_data(states));
+    int status = vi_door_exchange_show(e, time, e->cvode->vector_data(states));
     if (e->state_count == 0) {
         rates[0] = 0.0;
         return answer(e, status, VI_EXCHANGE_SET_TIME, rates, 1);
     }
     if (status == OK) {
         e->derivative_calls++;
-        status = get_numbers(e, VI_EXCHANGE_DERIVATIVES, rates, e->state_count);
+        status = vi_exchange_get_numbers(e, VI_EXCHANGE_DERIVATIVES, rates, e->state_count);
     }
     return answer(e, status, VI_EXCHANGE_DERIVATIVES, rates, e->state_count);
 }
 
-static int indicators_at(double time, void *states, double *indicators, void *user)
+/* The functions whose roots end a step: event indicators, then two of each watch. */
+static int roots_at(double time, void *states, double *roots, void *user)
 {
     vi_exchange *e = user;
-    int status = set_point(e, time, e->cvode->vector_data(states));
+    int status = vi_door_exchange_show(e, time, e->cvode->vector_data(states));
     if (status == OK) {
-        status = get_numbers(e, VI_EXCHANGE_INDICATORS, indicators, e->indicator_count);
+        status = vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
     }
-    return answer(e, status, VI_EXCHANGE_INDICATORS, indicators, e->indicator_count);
+    const int found = answer(e, status, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
+    if (found != GOOD || e->watch_count == 0) {
+        return found;
+    }
+    status = vi_exchange_read_watched(e);
+    vi_exchange_watch_roots(e, roots + e->indicator_count);
+    return answer(e, status, VI_EXCHANGE_GET, e->values, e->watched_count);
 }
 
 /* CVODE's own messages are not printed: its flag says all. */
@@ -164,7 +112,7 @@ static void ignore_message(int line, const char *function, const char *file, con
 static int solver_failed(vi_exchange *e, int flag)
 {
     e->solver_flag = flag;
-    return refused(e, e->function, VI_EXCHANGE_SOLVER);
+    return vi_exchange_refused(e, e->function, VI_EXCHANGE_SOLVER);
 }
 
 static int make_solver(vi_exchange *e)
@@ -178,15 +126,18 @@ static int make_solver(vi_exchange *e)
     c->push_message(e->context, ignore_message, NULL);
     e->vector = c->make_vector(count, e->states, e->context);
     e->tolerances = c->make_vector(count, e->absolute, e->context);
+    e->point_vector = c->make_vector(count, e->point, e->context);
     e->matrix = c->make_matrix(count, count, e->context);
     e->linear = c->make_linear(e->vector, e->matrix, e->context);
     e->solver = c->create(BDF, e->context);
-    if (e->vector == NULL || e->tolerances == NULL || e->matrix == NULL || e->linear == NULL || e->solver == NULL) {
+    if (e->vector == NULL || e->tolerances == NULL || e->point_vector == NULL || e->matrix == NULL || e->linear == NULL
+        || e->solver == NULL) {
         return solver_failed(e, 0);
     }
     int flag = c->init(e->solver, derivatives_at, e->time, e->vector);
     flag = flag != 0 ? flag : c->set_tolerances(e->solver, e->tolerance, e->tolerances);
-    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)e->indicator_count, indicators_at);
+    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)(e->indicator_count + 2 * e->watch_count), roots_at);
+    flag = flag != 0 || e->watch_count == 0 ? flag : c->set_directions(e->solver, e->directions);
     flag = flag != 0 ? flag : c->set_linear(e->solver, e->linear, e->matrix);
     flag = flag != 0 ? flag : c->set_user(e->solver, e);
     flag = flag != 0 ? flag : c->no_root_warning(e->solver);
@@ -206,6 +157,9 @@ void vi_door_exchange_end(vi_exchange *e)
     if (e->matrix != NULL) {
         c->free_matrix(e->matrix);
     }
+    if (e->point_vector != NULL) {
+        c->free_vector(e->point_vector);
+    }
     if (e->tolerances != NULL) {
         c->free_vector(e->tolerances);
     }
@@ -215,19 +169,19 @@ void vi_door_exchange_end(vi_exchange *e)
     if (e->context != NULL) {
         c->free_context(&e->context);
     }
-    e->solver = e->linear = e->matrix = e->tolerances = e->vector = e->context = NULL;
+    e->solver = e->linear = e->matrix = e->tolerances = e->vector = e->point_vector = e->context = NULL;
     e->has_begun = 0;
 }
 
 /* Absolute tolerances from the nominal values; a nominal value of 0 counts as 1. */
 static int read_nominals(vi_exchange *e)
 {
-    const int status = get_numbers(e, VI_EXCHANGE_NOMINALS, e->absolute, e->state_count);
+    const int status = vi_exchange_get_numbers(e, VI_EXCHANGE_NOMINALS, e->absolute, e->state_count);
     if (status != OK) {
         return status;
     }
     if (!are_finite(e->absolute, e->state_count)) {
-        return refused(e, VI_EXCHANGE_NOMINALS, VI_EXCHANGE_NOT_FINITE);
+        return vi_exchange_refused(e, VI_EXCHANGE_NOMINALS, VI_EXCHANGE_NOT_FINITE);
     }
     for (int64_t i = 0; i < e->state_count; i++) {
         e->absolute[i] = e->tolerance * (e->absolute[i] != 0.0 ? fabs(e->absolute[i]) : 1.0);
@@ -266,7 +220,7 @@ int vi_door_exchange_begin(vi_exchange *e, double time)
 
 int vi_door_exchange_enter(vi_exchange *e)
 {
-    const int status = call_plain(e, VI_EXCHANGE_ENTER_EVENT);
+    const int status = vi_exchange_call(e, VI_EXCHANGE_ENTER_EVENT);
     e->in_event_mode = status == OK;
     return status;
 }
@@ -274,7 +228,7 @@ int vi_door_exchange_enter(vi_exchange *e)
 int vi_door_exchange_update(vi_exchange *e, bool *again, bool *ends, bool *nominals, bool *values, bool *has_next,
                             double *next)
 {
-    const vi_exchange_function call = begin_call(e, VI_EXCHANGE_UPDATE);
+    const vi_exchange_function call = vi_exchange_begin_call(e, VI_EXCHANGE_UPDATE);
     int status;
     if (e->version == 3) {
         status = call.update3(e->fmu, again, ends, nominals, values, has_next, next);
@@ -288,11 +242,11 @@ int vi_door_exchange_update(vi_exchange *e, bool *again, bool *ends, bool *nomin
         *has_next = info.has_next != 0;
         *next = info.next;
     }
-    if (judged(e, VI_EXCHANGE_UPDATE, status) != OK) {
+    if (vi_exchange_judged(e, VI_EXCHANGE_UPDATE, status) != OK) {
         return status;
     }
     if (*has_next && isnan(*next)) {
-        return refused(e, VI_EXCHANGE_UPDATE, VI_EXCHANGE_NOT_FINITE);
+        return vi_exchange_refused(e, VI_EXCHANGE_UPDATE, VI_EXCHANGE_NOT_FINITE);
     }
     e->next_event = *has_next ? *next : (double)INFINITY;
     e->nominals_changed = e->nominals_changed || *nominals;
@@ -301,15 +255,16 @@ int vi_door_exchange_update(vi_exchange *e, bool *again, bool *ends, bool *nomin
 
 int vi_door_exchange_leave(vi_exchange *e)
 {
-    int status = call_plain(e, VI_EXCHANGE_ENTER_CONTINUOUS);
-    status = status != OK ? status : get_numbers(e, VI_EXCHANGE_GET_STATES, e->states, e->state_count);
+    int status = vi_exchange_call(e, VI_EXCHANGE_ENTER_CONTINUOUS);
+    status = status != OK ? status : vi_exchange_get_numbers(e, VI_EXCHANGE_GET_STATES, e->states, e->state_count);
     if (status == OK && !are_finite(e->states, e->state_count)) {
-        return refused(e, VI_EXCHANGE_GET_STATES, VI_EXCHANGE_NOT_FINITE);
+        return vi_exchange_refused(e, VI_EXCHANGE_GET_STATES, VI_EXCHANGE_NOT_FINITE);
     }
     if (status == OK && e->nominals_changed) {
         status = read_nominals(e);
     }
-    status = status != OK ? status : get_numbers(e, VI_EXCHANGE_INDICATORS, e->indicators, e->indicator_count);
+    status = status != OK ? status
+                          : vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, e->indicators, e->indicator_count);
     if (status == OK) {
         e->nominals_changed = e->inputs_changed = e->in_event_mode = 0;
         e->begins_anew = 1;
@@ -325,17 +280,17 @@ static int complete_step(vi_exchange *e, bool no_state_prior, bool *event, bool 
     if (!e->needs_completed) {
         return OK;
     }
-    const vi_exchange_function call = begin_call(e, VI_EXCHANGE_COMPLETED);
+    const vi_exchange_function call = vi_exchange_begin_call(e, VI_EXCHANGE_COMPLETED);
     /* the importer may still go back to the start of the step */
     const bool is_final = no_state_prior && !e->restorable;
     if (e->version == 3) {
-        return judged(e, VI_EXCHANGE_COMPLETED, call.completed3(e->fmu, is_final, event, ends));
+        return vi_exchange_judged(e, VI_EXCHANGE_COMPLETED, call.completed3(e->fmu, is_final, event, ends));
     }
     int event2 = 0, ends2 = 0;
     const int status = call.completed2(e->fmu, is_final, &event2, &ends2);
     *event = event2 != 0;
     *ends = ends2 != 0;
-    return judged(e, VI_EXCHANGE_COMPLETED, status);
+    return vi_exchange_judged(e, VI_EXCHANGE_COMPLETED, status);
 }
 
 /* One step of CVODE towards `goal`; `root` becomes whether an indicator has changed its sign at its end. */
@@ -343,6 +298,7 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
 {
     const vi_cvode *c = e->cvode;
     const size_t bytes = sizeof(double) * (size_t)(e->state_count > 0 ? e->state_count : 1);
+    const double before = e->time;
     memcpy(e->kept, e->states, bytes);
     for (int division = 0;; division++) {
         if (e->begins_anew) {
@@ -356,13 +312,13 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
         e->failure = OK;
         flag = flag != 0 ? flag : c->advance(e->solver, goal, e->vector, &reached, ONE_STEP);
         if (flag >= 0) {
-            *root = flag == ROOT_RETURN;
             e->time = reached;
             e->solver_steps++;
             if (division > 0) {
                 c->set_longest(e->solver, 0.0); /* none */
             }
-            return OK;
+            const int status = flag == ROOT_RETURN ? vi_exchange_judge_roots(e, before, root) : OK;
+            return status != OK ? status : vi_exchange_keep_samples(e, true);
         }
         if (e->failure != OK) { /* of the FMU: no function is called after it */
             e->reason = VI_EXCHANGE_STATUS;
@@ -382,21 +338,21 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
 /* A step below the rounding of CVODE. */
 static int rounding_step(vi_exchange *e, double goal)
 {
-    int status = get_numbers(e, VI_EXCHANGE_DERIVATIVES, e->kept, e->state_count);
+    int status = vi_exchange_get_numbers(e, VI_EXCHANGE_DERIVATIVES, e->kept, e->state_count);
     for (int64_t i = 0; status == OK && i < e->state_count; i++) {
         e->states[i] += (goal - e->time) * e->kept[i];
     }
     e->time = goal;
     e->begins_anew = 1;
-    return status;
+    return status != OK ? status : vi_exchange_keep_samples(e, false);
 }
 
 static int step_towards(vi_exchange *e, double goal, bool *root)
 {
     *root = false;
-    if (e->state_count == 0 && e->indicator_count == 0) {
+    if (e->state_count == 0 && e->indicator_count == 0 && e->watch_count == 0) {
         e->time = goal;
-        return OK;
+        return vi_exchange_keep_samples(e, false);
     }
     if (goal - e->time <= SHORTEST_STEP * fmax(fabs(goal), fabs(e->time))) {
         return rounding_step(e, goal);
@@ -409,7 +365,7 @@ static int compare_indicators(vi_exchange *e, bool *changed)
 {
     e->inputs_changed = 0;
     e->begins_anew = 1;
-    const int status = get_numbers(e, VI_EXCHANGE_INDICATORS, e->compared, e->indicator_count);
+    const int status = vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, e->compared, e->indicator_count);
     for (int64_t i = 0; status == OK && i < e->indicator_count; i++) {
         *changed = *changed || (e->compared[i] > 0.0) != (e->indicators[i] > 0.0);
     }
@@ -422,8 +378,10 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     const double target = time + size, room = SAME_INSTANT * (1.0 + fabs(time));
     *event = *ends = *early = false;
     *last_time = time;
+    e->meets = 0;
+    e->sample_count = 0;
     if (!(fabs(time - e->time) <= SAME_TIME * (1.0 + fabs(time)))) {
-        return refused(e, VI_EXCHANGE_SET_TIME, VI_EXCHANGE_TIME);
+        return vi_exchange_refused(e, VI_EXCHANGE_SET_TIME, VI_EXCHANGE_TIME);
     }
     if (e->inputs_changed) {
         const int status = compare_indicators(e, event);
@@ -441,9 +399,13 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     const double goal = has_time_event ? e->next_event : fmax(target, e->time);
     int64_t steps = 0, short_steps = 0;
     e->cause = -1;
-    while (e->time < goal && !*event && !*ends) {
+    const int marked = vi_exchange_mark_watches(e);
+    if (marked != OK) {
+        return marked;
+    }
+    while (e->time < goal && !*event && !*ends && !e->meets) {
         if (steps++ == e->most_steps) {
-            return refused(e, VI_EXCHANGE_DERIVATIVES, VI_EXCHANGE_STEPS);
+            return vi_exchange_refused(e, VI_EXCHANGE_DERIVATIVES, VI_EXCHANGE_STEPS);
         }
         bool root, wants_event = false;
         const double before = e->time;
@@ -455,10 +417,11 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
             short_steps++;
         }
         if (status == OK && short_steps > MOST_SHORT_STEPS) {
-            return refused(e, VI_EXCHANGE_DERIVATIVES, VI_EXCHANGE_SHORT);
+            return vi_exchange_refused(e, VI_EXCHANGE_DERIVATIVES, VI_EXCHANGE_SHORT);
         }
-        status = status != OK ? status : set_point(e, e->time, e->states);
+        status = status != OK ? status : vi_door_exchange_show(e, e->time, e->states);
         status = status != OK ? status : complete_step(e, no_state_prior, &wants_event, ends);
+        status = status != OK ? status : vi_exchange_follow_watches(e);
         if (status != OK) {
             return status;
         }
@@ -467,7 +430,7 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     *event = *event || (has_time_event && e->time >= goal);
     *last_time = fabs(e->time - target) <= room ? target : e->time;
     *early = *last_time < target;
-    return get_numbers(e, VI_EXCHANGE_INDICATORS, e->indicators, e->indicator_count);
+    return vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, e->indicators, e->indicator_count);
 }
 
 /* ---- states ---- */
@@ -479,7 +442,7 @@ int vi_door_exchange_save(vi_exchange *e, void **slot)
     if (s == NULL) {
         s = calloc(1, sizeof *s + sizeof(double) * (states + indicators));
         if (s == NULL) {
-            return refused(e, VI_EXCHANGE_SAVE, VI_EXCHANGE_STATUS);
+            return vi_exchange_refused(e, VI_EXCHANGE_SAVE, VI_EXCHANGE_STATUS);
         }
         *slot = s;
     }
@@ -491,7 +454,8 @@ int vi_door_exchange_save(vi_exchange *e, void **slot)
     if (indicators > 0) {
         memcpy(s->numbers + states, e->indicators, sizeof(double) * indicators);
     }
-    return judged(e, VI_EXCHANGE_SAVE, begin_call(e, VI_EXCHANGE_SAVE).save(e->fmu, &s->fmu_state));
+    return vi_exchange_judged(e, VI_EXCHANGE_SAVE,
+                              vi_exchange_begin_call(e, VI_EXCHANGE_SAVE).save(e->fmu, &s->fmu_state));
 }
 
 int vi_door_exchange_restore(vi_exchange *e, void *slot)
@@ -508,7 +472,8 @@ int vi_door_exchange_restore(vi_exchange *e, void *slot)
     if (indicators > 0) {
         memcpy(e->indicators, s->numbers + states, sizeof(double) * indicators);
     }
-    return judged(e, VI_EXCHANGE_RESTORE, begin_call(e, VI_EXCHANGE_RESTORE).restore(e->fmu, s->fmu_state));
+    return vi_exchange_judged(e, VI_EXCHANGE_RESTORE,
+                              vi_exchange_begin_call(e, VI_EXCHANGE_RESTORE).restore(e->fmu, s->fmu_state));
 }
 
 int vi_door_exchange_free(vi_exchange *e, void **slot)
@@ -516,7 +481,8 @@ int vi_door_exchange_free(vi_exchange *e, void **slot)
     saved_state *s = *slot;
     int status = OK;
     if (s != NULL && s->fmu_state != NULL) {
-        status = judged(e, VI_EXCHANGE_FREE, begin_call(e, VI_EXCHANGE_FREE).save(e->fmu, &s->fmu_state));
+        status = vi_exchange_judged(e, VI_EXCHANGE_FREE,
+                                    vi_exchange_begin_call(e, VI_EXCHANGE_FREE).save(e->fmu, &s->fmu_state));
     }
     free(s);
     *slot = NULL;

@@ -19,9 +19,10 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.events import Event
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import (
+    BodyPoint,
     ComponentSpec,
     ConnectionSpec,
-    EventSpec,
+    PairSpec,
     StopContactSpec,
 )
 from vibroimpact.orchestrator.run.general import GeneralRunner
@@ -284,24 +285,17 @@ def test_a_kind_that_the_fmu_lacks_is_refused(folder: Path, file: str, run_as: s
         Component(ComponentSpec("m", folder / file, run_as=run_as))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("which", ["body", "stop"])
-def test_a_contact_needs_co_simulation(folder: Path, which: str) -> None:
-    parts = {
-        "body": [spec(folder, "3.0"), ComponentSpec("s", fmu_path("ImpactStop", "3.0"))],
-        "stop": [
-            ComponentSpec("m", folder / "Mass.fmi3.fmu"),
-            ComponentSpec("s", fmu_path("ImpactStop", "3.0"), run_as="model_exchange"),
-        ],
-    }[which]
-    force = "u" if which == "body" else "f"
-    contact = StopContactSpec("m", "x", "v", force, "s", 1.0, side="upper")
-    with pytest.raises(ComponentError, match=r"expected a component that runs as co-simulation in a contact"):
-        Importer(parts, contacts=[contact])
-
-
-def test_a_watched_variable_needs_co_simulation(folder: Path) -> None:
-    with pytest.raises(ComponentError, match=r"m: expected a watched component .* got model exchange"):
-        Importer([spec(folder, "3.0")], events=[EventSpec("m", "x")])
+@pytest.mark.parametrize("which", ["port", "stop"])
+def test_a_stop_and_a_contact_port_need_co_simulation(folder: Path, which: str) -> None:
+    ours = ComponentSpec(
+        "s", fmu_path("ImpactStop" if which == "stop" else "Oscillator"), run_as="model_exchange"
+    )
+    contacts = [StopContactSpec("m", "x", "v", "f", "s", 1.0)] if which == "stop" else []
+    pairs = [PairSpec(("s", "contact[1]"), BodyPoint("m", "x", "v", "f", 1.0))] if which == "port" else []
+    with pytest.raises(
+        ComponentError, match="s: expected a stop or a contact port that runs as co-simulation"
+    ):
+        Importer([ComponentSpec("m", folder / "Mass.fmi3.fmu"), ours], contacts=contacts, pairs=pairs)
 
 
 def test_a_machine_without_the_library_gets_an_error_that_names_it(
@@ -358,9 +352,56 @@ def test_a_scene_names_a_kind_that_its_fmu_lacks(folder: Path) -> None:
         parse_scene(text, str(folder / "scene.toml"))
 
 
-def test_a_scene_with_a_contact_in_model_exchange_is_one_line(folder: Path) -> None:
-    contact = '[[contact]]\nbody = "m"\ndisplacement = "x"\nvelocity = "v"\nforce = "u"\nstop = "s"\n'
-    text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="auto", more='[component.s]\nfmu = "ImpactStop"')
-    expected = r"contact\[1\].body: expected a component that runs as co-simulation, got m in model exchange"
-    with pytest.raises(SceneError, match=expected):
-        parse_scene(text + contact, str(folder / "scene.toml"))
+CONTACT = '[[contact]]\nbody = "m"\ndisplacement = "x"\nvelocity = "v"\nstop = "s"\n'
+STOP = (
+    '[component.s]\nfmu = "ImpactStop"\nparameters = { position = -0.5, side = "lower", restitution = 0.8 }\n'
+)
+
+
+def test_a_scene_with_a_contact_in_model_exchange_runs_and_records_its_impacts(folder: Path) -> None:
+    text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="auto", more=STOP).replace("= 1.0", "= 2.5")
+    record = None
+    for force in ("", 'force = "u"\n'):
+        runner = GeneralRunner(parse_scene(text + CONTACT + force, str(folder / "scene.toml")))
+        record = runner.run({})
+        runner.close()
+        assert record.impacts is not None
+        assert record.impacts[:, 0] == pytest.approx([math.acos(-0.5)], abs=1e-6)
+        assert record.impacts[:, 2] == pytest.approx([math.sin(math.acos(-0.5))], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            [('fmu = "ImpactStop"', 'fmu = "ImpactStop"\nrun_as = "model_exchange"')],
+            r"contact\[1\].stop: expected a component that runs as co-simulation, got s in model exchange. ",
+        ),
+        (
+            [("restitution = 0.8", 'law = "hertz", stiffness = 1e4')],
+            r"contact\[1\].stop: expected a rigid stop, got s, which yields, for m in model exchange without force",
+        ),
+        (
+            [("Exchanged.fmi3.fmu", "Mass.fmi3.fmu")],
+            r"contact\[1\].force: expected the name of an input of the body: the force on that point, got nothing",
+        ),
+    ],
+)
+def test_a_contact_that_cannot_be_is_one_line(
+    folder: Path, changes: list[tuple[str, str]], message: str
+) -> None:
+    text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="auto", more=STOP) + CONTACT
+    for old, new in changes:
+        text = text.replace(old, new)
+    with pytest.raises(SceneError, match=message):
+        parse_scene(text, str(folder / "scene.toml"))
+
+
+def test_a_scene_watches_a_variable_in_model_exchange(folder: Path) -> None:
+    event = '[[event]]\nwatch = "m.x"\ndirection = "falling"\nlevel = 0.9\n'
+    text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="auto", more="") + event
+    runner = GeneralRunner(parse_scene(text, str(folder / "scene.toml")))
+    events = runner.run({}).events
+    runner.close()
+    assert events is not None
+    assert events[:, 0] == pytest.approx([math.acos(0.9)], abs=1e-7)

@@ -267,7 +267,11 @@ def test_a_body_of_another_tool_is_hit_where_the_law_yields(tmp_path: Path) -> N
         ),
         ('velocity = "v"', 'velocity = "x"', "contact[1].bodies.ball.velocity: expected a variable in m/s"),
         ("mass = 1.0 }", "mass = -1.0 }", "contact[1].bodies.ball.mass: expected a number > 0, got -1.0"),
-        (", mass = 1.0 }", " }", "contact[1].bodies.ball.mass: expected a number > 0, got nothing"),
+        (
+            ", mass = 1.0 }",
+            " }",
+            "contact[1].bodies.ball.mass: expected the effective mass, a number > 0, got nothing",
+        ),
         ("{ ball =", "{ bal =", 'contact[1].bodies.bal: expected one of "tip" and "ball"'),
         ("bodies = { ball", "bodies = 3 # { ball", "contact[1].bodies: expected a table of bodies"),
         (

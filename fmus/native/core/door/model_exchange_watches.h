@@ -1,0 +1,22 @@
+/* Watched points of an FMU for model exchange: a step of CVODE ends where one meets its surface or its level. */
+#ifndef VIBROIMPACT_MODEL_EXCHANGE_WATCHES_H
+#define VIBROIMPACT_MODEL_EXCHANGE_WATCHES_H
+
+#include <stdbool.h>
+
+#include "door/model_exchange_calls.h"
+
+/* Set the levels of contacts for a step that begins at the present point. */
+int vi_exchange_mark_watches(vi_exchange *exchange);
+/* Write two functions of each watch: the distance from its level, and the closing speed of a contact. Each falls
+ * through 0 at a meeting, and at a turn of the motion. */
+void vi_exchange_watch_roots(const vi_exchange *exchange, double roots[]);
+/* Judge the roots at the end of a step of CVODE from `before`, s: `event` becomes whether one is an event. Where a
+ * contact point met its surface, the step ends there. */
+int vi_exchange_judge_roots(vi_exchange *exchange, double before, bool *event);
+/* Forget the touching of contact points that have moved away. */
+int vi_exchange_follow_watches(vi_exchange *exchange);
+/* Keep the states at the instants up to the present time; `by_solver`: CVODE has made the step, else they are constant. */
+int vi_exchange_keep_samples(vi_exchange *exchange, bool by_solver);
+
+#endif

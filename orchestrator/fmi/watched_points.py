@@ -1,0 +1,120 @@
+"""Watched points of an FMU for model exchange: surfaces that a contact point may meet, and levels of variables."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core.model_exchange import Exchange, ExchangeWatch
+
+Direction = Literal["falling", "rising", "either"]
+DIRECTIONS: dict[Direction, int] = {"falling": -1, "rising": 1, "either": 0}
+
+
+class ContactWatch:
+    """A contact point, whose steps end where it meets a surface that stands still."""
+
+    def __init__(self, owner: WatchedPoints, place: int) -> None:
+        self._owner, self._place = owner, place
+
+    @property
+    def _watch(self) -> ExchangeWatch:
+        return self._owner.watches[self._place]
+
+    def put(self, position: float, side: float) -> None:
+        """Put the surface at a position, m, above the point (side 1) or below it (side -1)."""
+        self._watch.factor, self._watch.offset = -side, side * position
+
+    def arm(self, room: float) -> None:
+        """Find meetings in the next step; below the distance `room`, m, the point touches the surface already."""
+        if not self._watch.is_armed:
+            self._owner.begin_anew()
+        self._watch.is_armed, self._watch.room = 1, room
+
+    def disarm(self) -> None:
+        """Find no meetings: the point rests on the surface, or the run has no such contact."""
+        self._watch.is_armed = 0
+
+
+class WatchedPoints:
+    """The watched points of one instance, in memory that C code reads.
+
+    Attributes
+    ----------
+    watches : ctypes array of ExchangeWatch
+    has_contacts : bool
+        The body has a part in a contact.
+    """
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+        self.watches = (ExchangeWatch * 0)()
+        self.has_contacts = False
+        self._references: list[int] = []
+        self._contacts: list[ContactWatch] = []
+        self._instants = self._samples = np.zeros(0)
+
+    def contact(self, displacement: int, velocity: int) -> ContactWatch:
+        """Watch the contact point with these value references; without a surface so far."""
+        place = self._add(
+            ExchangeWatch(value=self._place(displacement), rate=self._place(velocity), direction=-1)
+        )
+        self._contacts.append(ContactWatch(self, place))
+        return self._contacts[-1]
+
+    def level(self, variable: int, direction: Direction, level: float) -> None:
+        """End steps, with an event, where a variable crosses a level."""
+        numbers = {"value": self._place(variable), "rate": -1, "direction": DIRECTIONS[direction]}
+        self._add(ExchangeWatch(factor=1.0, offset=-level, is_armed=1, **numbers))
+
+    def _place(self, reference: int) -> int:
+        if reference not in self._references:
+            self._references.append(reference)
+        return self._references.index(reference)
+
+    def _add(self, watch: ExchangeWatch) -> int:
+        self.watches = (ExchangeWatch * (len(self.watches) + 1))(*self.watches, watch)
+        self._bind()
+        return len(self.watches) - 1
+
+    def begin(self) -> None:
+        """Start a run: contacts have their part in it once they are armed."""
+        for contact in self._contacts:
+            contact.disarm()
+        self._bind()
+        self.keep_samples(np.zeros(0))
+
+    def begin_anew(self) -> None:
+        """Let the integration begin anew: other functions have roots from now on."""
+        self._exchange.begins_anew = 1
+
+    def _bind(self) -> None:
+        exchange, directions = self._exchange, [0] * int(self._exchange.indicator_count)
+        for watch in self.watches:
+            directions += [watch.direction, -1]
+        references = np.array(self._references, dtype=np.uint32)
+        values, roots = np.zeros(len(references)), np.zeros(len(directions) or 1, dtype=np.intc)
+        numbers = np.array(directions or [0], dtype=np.intc)
+        # C code holds their addresses
+        self._kept: tuple[NDArray[Any], ...] = references, values, roots, numbers
+        exchange.watches = ctypes.addressof(self.watches)
+        for name, array in zip(("watched", "values", "roots", "directions"), self._kept, strict=True):
+            setattr(exchange, name, array.ctypes.data)
+        exchange.watch_count, exchange.watched_count = len(self.watches), len(references)
+
+    # ---- samples ----
+
+    def keep_samples(self, instants: NDArray[np.float64]) -> None:
+        """Keep the states at these ascending instants, s, in the next steps, from the solver's own motion."""
+        exchange = self._exchange
+        self._instants = np.ascontiguousarray(instants)
+        self._samples = np.zeros((len(instants), max(1, int(exchange.state_count))))
+        exchange.instants, exchange.samples = self._instants.ctypes.data, self._samples.ctypes.data
+        exchange.instant_count, exchange.sample_count = len(instants), 0
+
+    def samples(self) -> NDArray[np.float64]:
+        """Return the states that the last step has kept, shape (instants so far, states)."""
+        return self._samples[: int(self._exchange.sample_count)]
