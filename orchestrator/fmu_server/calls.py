@@ -64,6 +64,7 @@ class ServedInstance:
         word = STATE_WORDS[version]
         self._others: dict[str, Callable[[Any], Any]] = {
             INSTANTIATE: self._instantiate,
+            "GetString": self._get_string,
             "SetString": self._set_string,
             "SetClock": self._set_clock,
             "GetDirectionalDerivative": self._derivative,
@@ -193,13 +194,20 @@ class ServedInstance:
         return (c_size_t(call.size),) if self._is_3 else ()
 
     def _set_string(self, call: Any) -> Any:
-        count = len(call.references)
-        if len(call.texts) != count:
-            raise Refused(f"SetString: expected {count} texts, got {len(call.texts)}.")
-        texts = (c_char_p * max(1, count))(*(text.encode() for text in call.texts))
-        places = ((c_uint32 * max(1, count))(*call.references), c_size_t(count))
-        size = (c_size_t(count),) if self._is_3 else ()
-        return Result(status=self._call(call, *places, texts, *size))
+        if len(call.texts) != call.size:
+            raise Refused(f"SetString: expected {call.size} texts, got {len(call.texts)}.")
+        texts = (c_char_p * max(1, call.size))(*(text.encode() for text in call.texts))
+        return Result(status=self._call(call, *self._places(call), texts, *self._size(call)))
+
+    def _get_string(self, call: Any) -> Any:
+        found = (c_char_p * max(1, call.size))()
+        status = self._call(call, *self._places(call), found, *self._size(call))
+        if not 0 <= status <= WARNING:
+            return Result(status=status)
+        if None in found[: call.size]:
+            raise Refused(f"GetString: expected {call.size} texts of the FMU, got fewer.")
+        # the FMU's memory of a text is copied at once
+        return Result(status=status, texts=[text.decode("utf-8", "replace") for text in found[: call.size]])
 
     def _set_clock(self, call: Any) -> Any:
         count = len(call.references)

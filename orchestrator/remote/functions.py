@@ -56,6 +56,7 @@ class RemoteFunctions:
         self._has_changed = False  # a call waits that may change values
         self._is_stepping = False  # neither an event nor initialization goes on, in which more can be read
         self._at_once = False
+        self._texts: Any = None  # memory of the texts that were read last
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
@@ -75,6 +76,7 @@ class RemoteFunctions:
             return partial(self._get if verb == "Get" else self._set, name, self._values[rest])
         word = self._state_word
         others: dict[str, Function] = {
+            "GetString": self._get_string,
             "SetString": self._set_string,
             "SetClock": self._set_clock,
             "GetClock": partial(self._ask_clock, "GetClock"),
@@ -160,7 +162,23 @@ class RemoteFunctions:
 
     def _set_string(self, _: Any, place: Any, count: Any, texts: Any, *size: Any) -> int:
         given = [text.decode() for text in texts]
-        return self._later(Call(function="SetString", references=_references(place, count), texts=given))
+        return self._later(
+            Call(function="SetString", references=_references(place, count), size=len(given), texts=given)
+        )
+
+    def _get_string(self, _: Any, places: Any, count: Any, address: Any, size: Any = None) -> int:
+        length = (count if size is None else size).value
+        result = self._flushed(
+            [Call(function="GetString", references=_references(places, count), size=length)]
+        )
+        if result.status <= WARNING:
+            if len(result.texts) != length:
+                raise ComponentFileError(
+                    f"an answer of a server: expected {length} texts, got {len(result.texts)}."
+                )
+            self._texts = (ctypes.c_char_p * length)(*(text.encode() for text in result.texts))
+            ctypes.memmove(address.value, self._texts, ctypes.sizeof(self._texts))
+        return int(result.status)
 
     def _set_clock(self, _: Any, places: Any, count: Any, ticks: Any) -> int:
         return self._later(Call(function="SetClock", references=_references(places, count)))

@@ -13,7 +13,7 @@ A batch has all calls of one step: the inputs, the step, the outputs. The messag
       uint32 slot = 8;                  // number of a saved state
     }
     message Batch { repeated Call calls = 1; }
-    message Result { sint32 status = 1; bytes values = 2; repeated double numbers = 3; }
+    message Result { sint32 status = 1; bytes values = 2; repeated double numbers = 3; repeated string texts = 4; }
     message Answer {
       repeated Result results = 1; repeated string log = 2; bool changed_rounding = 3; string refusal = 4;
     }
@@ -97,7 +97,7 @@ _FIELDS: Mapping[str, tuple[str, ...]] = {
         "uint32 slot",
     ),
     "Batch": ("Call* calls",),
-    "Result": ("sint32 status", "bytes values", "double* numbers"),
+    "Result": ("sint32 status", "bytes values", "double* numbers", "string* texts"),
     "Answer": ("Result* results", "string* log", "bool changed_rounding", "string refusal"),
     "Description": ("string version", "string name", "string sha256", "bytes xml"),
 }

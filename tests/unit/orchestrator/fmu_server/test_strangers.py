@@ -38,7 +38,7 @@ from vibroimpact.orchestrator.remote.protocol import (
     Description,
 )
 
-BEGIN = Call(function="Instantiate", texts=["x"], numbers=[1, 1])
+BEGIN = Call(function="Instantiate", texts=["x"], numbers=[1, 1, 0])
 KNOWN = ((TOKEN_KEY, f"Bearer {TOKEN}"), (PROTOCOL_KEY, PROTOCOL))
 
 
@@ -171,7 +171,7 @@ def refusal_of(*calls: Any) -> str:
         (Call(function="GetFloat64", references=[1], size=MOST_VALUES + 1), "values in all, got more"),
         (Call(function="DoStep", numbers=[0.0]), "expected 3 numbers, got others"),
         (Call(function="DoStep", numbers=[0.0, 1.0, math.nan]), "expected 3 numbers, got others"),
-        (Call(function="SetString", references=[1, 2], texts=["a"]), "expected 2 texts, got 1"),
+        (Call(function="SetString", references=[1, 2], size=2, texts=["a"]), "expected 2 texts, got 1"),
         (Call(function="GetShiftDecimal"), "expected one clock, got 0"),
         (Call(function="GetDirectionalDerivative", references=[1], size=1), "expected one known variable"),
     ],
@@ -183,7 +183,7 @@ def test_a_call_that_no_importer_makes_is_refused(call: Any, text: str) -> None:
 
 def test_no_call_is_made_before_an_instance(server: FmuServer) -> None:
     assert "expected Instantiate once, before all other calls" in refusal_of(Call(function="Terminate"))
-    assert "expected a name and two flags" in refusal_of(Call(function="Instantiate"))
+    assert "expected a name and three flags" in refusal_of(Call(function="Instantiate"))
     assert "expected 1 to 4096 calls" in refusal_of()
     assert "expected 1 to 4096 calls" in refusal_of(*[BEGIN] * 4097)
 
