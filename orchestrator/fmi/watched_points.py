@@ -99,7 +99,7 @@ class WatchedPoints:
         values, roots = np.zeros(len(references)), np.zeros(len(directions) or 1, dtype=np.intc)
         numbers = np.array(directions or [0], dtype=np.intc)
         # C code holds their addresses
-        self._kept: tuple[NDArray[Any], ...] = references, values, roots, numbers
+        self._kept: list[NDArray[Any]] = [references, values, roots, numbers]
         exchange.watches = ctypes.addressof(self.watches)
         for name, array in zip(("watched", "values", "roots", "directions"), self._kept, strict=True):
             setattr(exchange, name, array.ctypes.data)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers, shipped_kind
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
@@ -96,7 +98,8 @@ def laws(scene: Scene) -> dict[str, str]:
 def contacts(scene: Scene) -> dict[str, str]:
     """Return the partners of each contact of a general scene in words, by the key of the contact."""
     meetings = enumerate(scene.meetings, start=1)
-    return {f"contact[{number}]": _met(contact) for number, contact in meetings}
+    exchanged = {one.name for one in scene.components if one.run_as == "model_exchange"}
+    return {f"contact[{number}]": _met(contact, exchanged) for number, contact in meetings}
 
 
 def fused_form(scene: Scene) -> str:
@@ -143,10 +146,13 @@ def clock_remark(scene: Scene) -> str:
     return f"{swept}: {sines} sines without a common period; a forcing period is one of the first{near}"
 
 
-def _met(contact: StopContactSpec | PairSpec) -> str:
+def _met(contact: StopContactSpec | PairSpec, exchanged: Set[str]) -> str:
     if isinstance(contact, PairSpec):
         return f"{contact.name}, {contact.law}"
-    return f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
+    how = "force held over a step"
+    if contact.body in exchanged:
+        how = "impacts set its velocity" if contact.force is None else f"impulses on its states, {how}"
+    return f"{contact.body}.{contact.displacement} on {contact.stop}, {how}"
 
 
 def effects(scene: Scene) -> dict[str, bool]:

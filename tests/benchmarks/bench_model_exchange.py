@@ -2,6 +2,7 @@
 
 FMPy steps the FMU by its own exact motion (co-simulation), and integrates it by CVode (model exchange) at a ladder of
 tolerances. The third run is by this package. The error compares the last impact's time with the exact time.
+A scene of components then has the mass without its stop, and an ImpactStop in a `[[contact]]`, in both kinds.
 
 Run with `python tests/benchmarks/bench_model_exchange.py [FOLDER]`.
 """
@@ -24,6 +25,8 @@ import vibroimpact as vi
 from vibroimpact.analysis.dataset.provenance import git_commit, versions
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.shipped import fmu_path
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, RunAs, StopContactSpec
 
 TOLERANCES = np.array([1e-4, 1e-6, 1e-8, 1e-10])
 PERIODS = 100
@@ -31,6 +34,8 @@ OWN_PERIODS = 100 * PERIODS
 """Forcing periods of the run by this package, whose start and end alone take tenths of a second."""
 REPETITIONS = 3
 FREQUENCY = 0.9
+PERIOD, STEPS = 2.0 * math.pi / FREQUENCY, 8
+"""Forcing period, s, and communication steps in it of the scenes of components."""
 VALUES = {
     "damping": 0.1,
     "forcing.amplitude": 0.5,
@@ -60,7 +65,6 @@ def quickest(run: Callable[[], Any]) -> tuple[Any, float]:
 def simulated(kind: str, tolerance: float = 1e-6) -> tuple[float, float, float]:
     """Return the number of impacts, the time of the last one, s, and the seconds of a run by FMPy."""
     folder = str(unpack(fmu_path("Oscillator")).folder)
-    period = 2.0 * math.pi / FREQUENCY
 
     def run() -> Any:
         return fmpy.simulate_fmu(
@@ -69,8 +73,8 @@ def simulated(kind: str, tolerance: float = 1e-6) -> tuple[float, float, float]:
             solver="CVode",
             relative_tolerance=tolerance,
             start_values=VALUES,
-            stop_time=PERIODS * period,
-            output_interval=period,
+            stop_time=PERIODS * PERIOD,
+            output_interval=PERIOD,
             output=["contact[1].count", "contact[1].last_time"],
             record_events=False,
         )
@@ -79,11 +83,31 @@ def simulated(kind: str, tolerance: float = 1e-6) -> tuple[float, float, float]:
     return float(result["contact[1].count"][-1]), float(result["contact[1].last_time"][-1]), seconds
 
 
+def in_contact(run_as: RunAs, tolerance: float | None = None) -> tuple[float, float]:
+    """Return the time of the last impact, s, and the seconds of a run of the mass and an ImpactStop."""
+    free = {name: value for name, value in VALUES.items() if not name.startswith("contact")}
+    mass = ComponentSpec("mass", fmu_path("Oscillator"), free, tolerance, run_as)
+    stop = ComponentSpec("stop", fmu_path("ImpactStop"), {"restitution": 0.7, "position": 0.1})
+    contact = StopContactSpec("mass", "displacement", "velocity", "force", "stop", 1.0)
+    importer = Importer([mass, stop], contacts=[contact], macro_step=PERIOD / STEPS)
+
+    def run() -> float:
+        importer.begin()
+        importer.advance(PERIODS * PERIOD)
+        return importer.contacts.held[0].impacts.all[-1].time
+
+    last, seconds = quickest(run)
+    importer.free()
+    return last, seconds
+
+
 def measured() -> xr.Dataset:
     """Measure model exchange at all tolerances, and co-simulation and the run by this package once."""
     _, own = quickest(lambda: vi.run(SCENE))
     count, exact, stepped = simulated("CoSimulation")
     ladder = np.array([simulated("ModelExchange", float(t)) for t in TOLERANCES])
+    contacts = np.array([in_contact("model_exchange", float(t)) for t in TOLERANCES])
+    pulses, pulsed = in_contact("co_simulation")
     return xr.Dataset(
         {
             "impacts": ("tolerance", ladder[:, 0], {"units": "1", "long_name": "impacts"}),
@@ -93,6 +117,26 @@ def measured() -> xr.Dataset:
                 {"units": "s", "long_name": "error of the last impact's time"},
             ),
             "wall_time": ("tolerance", ladder[:, 2], {"units": "s", "long_name": "wall time"}),
+            "contact_error": (
+                "tolerance",
+                np.abs(contacts[:, 0] - exact),
+                {"units": "s", "long_name": "error of the last impact's time, [[contact]] in model exchange"},
+            ),
+            "contact_wall_time": (
+                "tolerance",
+                contacts[:, 1],
+                {"units": "s", "long_name": "wall time, [[contact]] in model exchange"},
+            ),
+            "contact_co_simulation_error": (
+                (),
+                abs(pulses - exact),
+                {"units": "s", "long_name": "error of the last impact's time, [[contact]] in co-simulation"},
+            ),
+            "contact_co_simulation_wall_time": (
+                (),
+                pulsed,
+                {"units": "s", "long_name": "wall time, [[contact]] in co-simulation"},
+            ),
             "co_simulation_wall_time": ((), stepped, {"units": "s", "long_name": "wall time, co-simulation"}),
             "own_wall_time": (
                 (),
@@ -124,6 +168,14 @@ def table(dataset: xr.Dataset) -> None:
         at = dataset.isel(tolerance=row)
         ratio = float(at.wall_time) / stepped
         print(f"  {float(at.tolerance):9.0e} {float(at.impacts):9.0f} {float(at.error):29.1e} {ratio:22.1f}")
+    pulsed = float(dataset.contact_co_simulation_wall_time)
+    print(f"  [[contact]] in co-simulation: {pulsed / count * 1e6:.0f} us an impact, ", end="")
+    print(f"error of the last impact {float(dataset.contact_co_simulation_error):.1e} s")
+    print("  tolerance   error of the last impact, s   cost / that   ([[contact]] in model exchange)")
+    for row in range(dataset.sizes["tolerance"]):
+        at = dataset.isel(tolerance=row)
+        ratio = float(at.contact_wall_time) / pulsed
+        print(f"  {float(at.tolerance):9.0e} {float(at.contact_error):29.1e} {ratio:13.2f}")
 
 
 def main() -> None:

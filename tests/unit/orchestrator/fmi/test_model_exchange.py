@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.importer.specification import (
     StopContactSpec,
 )
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.summary import engine
+from vibroimpact.orchestrator.run.summary import contacts, engine
 from vibroimpact.orchestrator.scene import parse_scene
 
 VERSIONS = ("2.0", "3.0")
@@ -362,7 +362,11 @@ def test_a_scene_with_a_contact_in_model_exchange_runs_and_records_its_impacts(f
     text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="auto", more=STOP).replace("= 1.0", "= 2.5")
     record = None
     for force in ("", 'force = "u"\n'):
-        runner = GeneralRunner(parse_scene(text + CONTACT + force, str(folder / "scene.toml")))
+        scene = parse_scene(text + CONTACT + force, str(folder / "scene.toml"))
+        assert ("impulses on its states" if force else "impacts set its velocity") in contacts(scene)[
+            "contact[1]"
+        ]
+        runner = GeneralRunner(scene)
         record = runner.run({})
         runner.close()
         assert record.impacts is not None
