@@ -36,8 +36,6 @@ NUMBERS = {
     **dict.fromkeys(COUNTS, ("0", "1", "7", "1000000000", "-1")),
 }
 CLOCKS = ("constant", "fixed", "tunable", "changing", "countdown", "triggered")
-#: Largest difference of a value from that of the honest description.
-CLOSE = {CO_SIMULATION: 1e-9, MODEL_EXCHANGE: 1e-4}
 DESCRIPTIONS = 3000
 """Number of different descriptions: a process keeps the library of each. The scenes around them all differ."""
 LONGEST = 0.6
@@ -58,12 +56,16 @@ class Subject:
         Its interface.
     outputs : tuple of str
         The values that are compared.
-    parameters : mapping, or tuple of mappings
+    parameters : tuple of mappings
         Its start values; one of the mappings is drawn.
     honest : tuple of (str, str)
         Replacements that make its description honest.
-    invisible : mapping of str to str
+    invisible : tuple of (str, str)
         Lies that no importer can see: a flag and its value.
+    close : float
+        Largest difference of a value from that of the honest description.
+    in_loop : bool
+        Its input `u` is half its output `y`.
     """
 
     write: Write
@@ -73,6 +75,8 @@ class Subject:
     parameters: tuple[dict[str, float], ...] = ({},)
     honest: tuple[tuple[str, str], ...] = ()
     invisible: tuple[tuple[str, str], ...] = ()
+    close: float = 1e-9
+    in_loop: bool = False
 
 
 BOTH = ("2.0", "3.0")
@@ -113,16 +117,27 @@ SUBJECTS = {
         CO_SIMULATION,
         ("beats", "strides", "fuses", "sum"),
     ),
+    # its loop with a gain is solved by derivatives, which are false by `lie`
+    "loop": Subject(
+        *(fmu_factory.feedthrough, BOTH, CO_SIMULATION, ("y",)),
+        tuple({"law": float(law), "lie": lie} for law in (0, 1, 2) for lie in (0.0, 0.5)),
+        in_loop=True,
+    ),
     "exchanged": Subject(
         *(fmu_factory.exchanged, BOTH, MODEL_EXCHANGE, ("x", "v", "count")),
         tuple({"kind": float(kind)} for kind in (0, 1, 2)),
+        close=1e-4,
     ),
     # it stops where a completed step lies beyond x = `at`
     "completed": Subject(
         *(fmu_factory.exchanged, BOTH, MODEL_EXCHANGE, ("x", "v"), ({"kind": 3.0, "x": 0.1, "v": 1.0},)),
+        close=0.1,  # the solver's steps decide where it stops
         invisible=(("needsCompletedIntegratorStep", "false"), ("completedIntegratorStepNotNeeded", "true")),
     ),
 }
+
+
+_OTHER = {CO_SIMULATION: MODEL_EXCHANGE, MODEL_EXCHANGE: CO_SIMULATION}
 
 
 def told(seed: int) -> str | None:
@@ -137,6 +152,8 @@ def told(seed: int) -> str | None:
     )
     lies = _lies(draw, subject.owner, fmi)
     texts = _false_clocks(draw) if name == "clocks" and draw.random() < 0.5 else {}
+    if draw.random() < 0.03:  # a kind that the binary does not have
+        texts[f"<{subject.owner}"] = f"<{_OTHER[subject.owner]}"
     _described(honest, folder / "lying.fmu", texts, lies, subject.owner)
     draw = random.Random(seed)
     scene = _scene(draw, subject, folder)
@@ -177,11 +194,11 @@ def _described(source: Path, target: Path, texts: dict[str, str], flags: dict[st
             content = archive.read(name)
             if name == "modelDescription.xml":
                 text = content.decode()
-                for old, new in texts.items():
-                    text = text.replace(old, new, 1)
                 for flag, value in flags.items():
                     text = re.sub(rf'(<{owner}\b[^>]*?) {flag}="[^"]*"', r"\1", text)
                     text = text.replace(f"<{owner}", f'<{owner} {flag}="{value}"', 1)
+                for old, new in texts.items():
+                    text = text.replace(old, new, 1)
                 content = text.encode()
             changed.writestr(name, content)
     return target
@@ -203,9 +220,13 @@ def _scene(draw: random.Random, subject: Subject, folder: Path) -> Tables:
             components["y"] = {"fmu": fmu_factory.faulty(folder, draw.choice(BOTH)).name}
         case _:
             pass
+    links = [{"from": "m.y", "to": "g.u"}, {"from": "g.y", "to": "m.u"}] if subject.in_loop else []
+    if links:
+        components["g"] = {"fmu": fmu_factory.gain(folder).name, "parameters": {"k": 0.5, "b": 0.1}}
     return {
         "scene": {"units": "SI"},
         "component": components,
+        "connection": links,
         "record": {
             "recorded_time": LONGEST,
             "transient_time": draw.choice((0.0, 0.0, 0.1, 0.033)),
@@ -259,6 +280,6 @@ def _judged(
         else np.inf
     )
     new = set(got.message.split("; ")) - set(truth.message.split("; "))
-    if off <= CLOSE[subject.owner] or is_unseen or any(re.search(r"\bm\b", remark) for remark in new):
+    if off <= subject.close or is_unseen or any(re.search(r"\bm\b", remark) for remark in new):
         return None
     return f"values off by {off:.2g}, and no word but {got.message!r}"
