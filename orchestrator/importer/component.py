@@ -371,6 +371,23 @@ class Component:
         self.instance.restore(self.at_start)
         self.write_inputs()
 
+    def stays_ahead(self, time: float, target: float) -> bool:
+        """Has it made a step from `time`, s, that it cannot take back?
+
+        ComponentError: that step has passed the event of another at `target`, s.
+        """
+        reached = self.instance.time
+        if self.has_states or reached <= time + SAME_INSTANT * (1.0 + abs(time)):
+            return False
+        if reached > target + SAME_INSTANT * (1.0 + abs(target)):
+            raise ComponentError(
+                f"{self.name}: expected a component that goes back to time {target:.17g}, where another has an event, "
+                f"got one that stays at {reached:.17g} (canGetAndSet{self.instance.state_word} = false).",
+                instance=self.name,
+                time=reached,
+            )
+        return True
+
     def is_within_own_step(self, time: float) -> bool:
         """Are the others at `time`, s, within a step of this component, which it makes later?"""
         return self.on_own_grid and self.instance.time < time - SAME_INSTANT * (1.0 + abs(time))

@@ -218,8 +218,7 @@ class Importer:
     def _make_plain_steps(self, loop: PlainLoop, end: float, seconds: float) -> None:
         """Make plain steps in C up to the first step that needs this class, and finish that step."""
         late = None if self.on_event is None else self.late_events or NO_EVENTS
-        hears_pauses = self.on_pause is not None
-        came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=hears_pauses)
+        came_to = loop.advance(end, self.macro_step, seconds, late, hears_pauses=self.on_pause is not None)
         run = loop.run
         self.wants_to_end = bool(run.wants_to_end)
         if came_to is CouplingEnd.stepped:
@@ -236,8 +235,6 @@ class Importer:
             loop.explain()
         elif came_to is CouplingEnd.endless:
             raise self._plan.event_mode.endless_error(self.time)
-
-    # ---- one step ----
 
     def _step(self, time: float, target: float) -> None:
         """Make a step towards `target`."""
@@ -263,9 +260,11 @@ class Importer:
             self._agree(time, overtaken)
         if contacts.active:
             self._settle_contacts(time)
-        if self._plan.stateless_paths and self._reached > time:
+        while self._plan.stateless_paths and self._reached > time:
             contacts.agree(time, self._reached)
-            self._step_stateless(time, self._reached)
+            if (overtaken := self._step_stateless(time, self._reached)) is None:
+                break
+            self._agree(time, overtaken)
         if contacts:
             self._at_event += contacts.end_step(self._reached - time)
         self._conclude(time, target)
@@ -287,8 +286,7 @@ class Importer:
                 watch.confirm()
             self._note(component.name for component in self._at_event)
         if self._at_event or self.ticks.are_due(end):
-            if self._plan.event_mode.resolve(end, self.ticks):
-                self.wants_to_end = True
+            self.wants_to_end = self._plan.event_mode.resolve(end, self.ticks) or self.wants_to_end
         elif end < target and self.on_pause is not None:
             self.on_pause()
         if self.contacts.pairs:
@@ -397,8 +395,8 @@ class Importer:
     def _step_one(self, component: Component, time: float, target: float, made: Made | None = None) -> float:
         """Step one component, or take the step it has made; returns the time of its first event, or `target`."""
         instance = component.instance
-        if not component.has_states and time < target == instance.time:  # it cannot go back, and is there
-            return self._after_step(component, target) if instance.is_flagged else target
+        if made is None and component.stays_ahead(time, target):  # a repeated step
+            return self._after_step(component, target)
         status = instance.step(time, target - time) if made is None else instance.take_step(made.status)
         if status == DISCARD:
             instance.check(status, "DoStep")
@@ -442,8 +440,6 @@ class Importer:
             return target
         return time + located
 
-    # ---- events ----
-
     def _note(self, components: Iterable[str]) -> None:
         for name in components:
             index = self._progress.note_event()
@@ -459,10 +455,7 @@ class Importer:
     # ---- repeated steps ----
 
     def _iterate(self, time: float) -> float | None:
-        """Repeat a step (exchange "iterated") until its inputs are the ones that the values at its end give.
-
-        Returns the time of an event that these inputs make earlier than the end; None without one.
-        """
+        """Repeat a step (exchange "iterated") until its inputs are those at its end; returns an earlier event."""
         if not self._plan.iterates:
             return None
         target = self._reached
@@ -487,14 +480,18 @@ class Importer:
         self._reached = self._at_event[0].instance.time if self._at_event else target
         return None
 
-    def _step_stateless(self, time: float, end: float) -> None:
-        """Step the components without states, once the end of the step is agreed."""
+    def _step_stateless(self, time: float, end: float) -> float | None:
+        """Step the components without states, once the end is agreed; returns the time of an event before it."""
         for component, inputs in self._plan.stateless_paths:
             if inputs is not None:
                 inputs()
             reached = self._step_one(component, time, end)
             if reached < end and self.wants_to_end:
                 self._end_run(time, reached, end)
+            elif reached < end:
+                self._stopper = component
+                return reached
+        return None
 
     def free(self) -> None:
         """Free all components."""

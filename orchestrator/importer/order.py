@@ -14,6 +14,8 @@ def stepping_order(
 ) -> list[Component]:
     """Return the components in order: those with event mode first, then others with states, those without states last.
 
+    Among those without states a component with event mode comes first: the others follow to its events.
+
     Among components with states, one that gives an input its slope comes last, such as a Replay. Value and slope
     belong to the start of a step.
 
@@ -25,7 +27,7 @@ def stepping_order(
 
     def rank(component: Component) -> int:
         if not component.has_states:
-            return 3
+            return 3 if component.event_mode else 4
         return 0 if component.event_mode else 2 if component.name in drawing else 1
 
     after = _feeding(components, connections, connected=False)

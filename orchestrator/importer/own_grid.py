@@ -191,17 +191,24 @@ def step_remarks(component: Component, macro_step: float, samples: tuple[float, 
     samples : tuple of float, or None
         Time of the first sample of its variables, s, and the time between two; None without samples.
     """
-    instance, declared = component.instance, component.capabilities
+    instance, declared, name = component.instance, component.capabilities, component.name
+    if component.on_own_grid:
+        return []
+    if declared.variable_steps and not component.has_states and not _are_multiples(samples or (), macro_step):
+        flag = f"canGetAndSet{instance.state_word} = false"
+        return [f"samples of {name} between communication steps are interpolated ({flag})"]
     step = instance.internal_step if declared.variable_steps else instance.only_step
-    times = [*(samples or ()), *([macro_step] if declared.variable_steps else [])]
-    if step == 0.0 or component.on_own_grid or all(is_multiple(time, step) for time in times):
+    times = (*(samples or ()), *((macro_step,) if declared.variable_steps else ()))
+    if step == 0.0 or _are_multiples(times, step):
         return []
     if declared.variable_steps:
         what = f"has the values of the last multiple of {step:g} s ({INTERNAL_STEP})"
-        return [f"{component.name} {what} between these multiples"]
-    return [
-        f"samples of {component.name} between its steps of {step:g} s are interpolated ({VARIABLE_STEPS} = false)"
-    ]
+        return [f"{name} {what} between these multiples"]
+    return [f"samples of {name} between its steps of {step:g} s are interpolated ({VARIABLE_STEPS} = false)"]
+
+
+def _are_multiples(times: Iterable[float], step: float) -> bool:
+    return all(is_multiple(time, step) for time in times)
 
 
 def _room(time: float) -> float:

@@ -111,14 +111,10 @@ class StepPlan:
 
     def _made_loop(self) -> PlainLoop | None:
         parts = self._parts
-        if (
-            self.iterates
-            or self.stateless_paths
-            or parts.watches
-            or parts.tuning
-            or parts.ticks
-            or parts.grids
-        ):
+        # others go back to its events, and it is not stepped again
+        stays = len(self.paths) > 1 and any(c.event_mode and not c.has_states for c, _ in self.paths)
+        rare = (parts.watches, parts.tuning, parts.ticks, parts.grids, self.stateless_paths)
+        if self.iterates or stays or any(rare):
             return None
         components, inputs = zip(*self.paths, strict=True)
         events = self.event_mode

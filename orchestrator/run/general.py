@@ -212,14 +212,13 @@ class GeneralRunner(Runner):
             for name, component in self._importer.components.items()
             if component.refuses_events
         ]
-        remarks += self._remarks_on_steps()
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:
                 remarks.append(
                     f"others, which could not be taken back, had been stepped to {self._importer.overrun:.17g}"
                 )
-        return remarks
+        return remarks + self._remarks_on_steps()
 
     def _remarks_on_steps(self) -> list[str]:
         """Return the remarks on components whose steps have sizes of their own."""

@@ -1,4 +1,4 @@
-"""Misbehaving FMUs: any fault in any call, of either version, in a guarded run between innocent points."""
+"""Misbehaving FMUs: any fault in any call, in a guarded run between innocent points, and lies about every flag."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 import psutil  # type: ignore[import-untyped, unused-ignore]
 from support import fmu_factory
 
+from soak import _lies
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard import guarded as guard
@@ -20,8 +21,8 @@ from vibroimpact.orchestrator.run import Runner
 from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
-CASES = 5000
-SAMPLE = 2
+CASES = 15_000
+SAMPLE = 3
 SECONDS = 30.0
 
 #: Numbers of faults and places in the model descriptions of Faulty; the event fault exists only in FMI 3.0.
@@ -54,7 +55,9 @@ deadline = {deadline}
 
 
 def check(seed: int) -> str | None:
-    """Return the problem of a guarded run of a misbehaving FMU; None without one."""
+    """Return the problem of a lying or misbehaving FMU; None without one. Of three cases two are lies."""
+    if seed % 3:
+        return _lies.told(seed)
     draw = random.Random(seed)
     fmi = draw.choice(("2.0", "3.0"))
     fault = draw.choice([f for f in FAULTS if (fmi, f) != ("2.0", ENDLESS_EVENTS)])
