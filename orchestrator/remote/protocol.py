@@ -1,26 +1,8 @@
 """The messages between an importer and a server of FMUs: batches of FMI calls, and their answers.
 
-A batch has all calls of one step: the inputs, the step, the outputs. The messages are protobuf, version 3:
-
-    message Call {
-      string function = 1;              // FMI's name without prefix, of the tables below
-      repeated uint32 references = 2;
-      repeated uint32 others = 3;       // GetDirectionalDerivative: the known variables
-      uint32 size = 4;                  // number of values to return
-      bytes values = 5;                 // little-endian, in the C type of the function
-      repeated double numbers = 6;      // the scalar arguments, integers and booleans too
-      repeated string texts = 7;
-      uint32 slot = 8;                  // number of a saved state
-    }
-    message Batch { repeated Call calls = 1; }
-    message Result { sint32 status = 1; bytes values = 2; repeated double numbers = 3; repeated string texts = 4; }
-    message Answer {
-      repeated Result results = 1; repeated string log = 2; bool changed_rounding = 3; string refusal = 4;
-    }
-    message Description { string version = 1; string name = 2; string sha256 = 3; bytes xml = 4; }
-    service Fmu { rpc Describe(Batch) returns (Description); rpc Run(stream Batch) returns (stream Answer); }
-
-A batch ends with the first call that returns more than a warning. Arrays are bytes, so that each bit arrives.
+A batch has all calls of one step: the inputs, the step, the outputs. It ends with the first call that returns more than
+a warning. `Describe` answers a batch with a description; `Run` is a stream of batches, each with one answer. The
+messages are protobuf, version 3, with the fields of `_FIELDS`. Arrays are bytes, so that each bit arrives.
 """
 
 from __future__ import annotations
@@ -85,16 +67,17 @@ VALUES: Mapping[str, Mapping[str, Any]] = {
 #: Names of the functions of saved states: their first word, and FMI's spelling of the second.
 STATE_WORDS = {"3.0": "FMUState", "2.0": "FMUstate"}
 
+#: The messages: type and name of each field, numbered from 1; a star marks a repeated field.
 _FIELDS: Mapping[str, tuple[str, ...]] = {
     "Call": (
-        "string function",
+        "string function",  # FMI's name without prefix
         "uint32* references",
-        "uint32* others",
-        "uint32 size",
-        "bytes values",
-        "double* numbers",
+        "uint32* others",  # GetDirectionalDerivative: the known variable
+        "uint32 size",  # number of values
+        "bytes values",  # little-endian, in the C type of the function
+        "double* numbers",  # the scalar arguments, integers and booleans too
         "string* texts",
-        "uint32 slot",
+        "uint32 slot",  # number of a saved state
     ),
     "Batch": ("Call* calls",),
     "Result": ("sint32 status", "bytes values", "double* numbers", "string* texts"),

@@ -75,6 +75,7 @@ LIGHT: Rows = {
     "fmu list": ("numpy", 0),
     "fmu build --output scene.toml": ("numpy", 2),
     "fmu export oscillator -o body.fmu": ("numpy", 0),
+    "fmu serve absent.fmu": ("grpc numpy", 2),
     f"submit scene.toml --service {NOWHERE} --data served": ("httpx", 1),
     f"status --service {NOWHERE} --data served": ("httpx", 1),
     f"fetch 0123456789abcdef0123456789abcdef -o fetched.nc --service {NOWHERE} --data served": ("httpx", 1),
