@@ -31,6 +31,7 @@ CAUSES = {
     "model exchange alone": r"model exchange|ModelExchange",
     "needs a library or module that is not here": r"cannot open shared object|No module|No such file|JVM",
     "description beyond repair": r"modelDescription\.xml|its description",
+    "names of members with backslashes": r"has a backslash",
     "no FMU inside": r"expected a safe FMU|not a zip|expected an FMU",
     "lacks a function of FMI": r"a binary that exports",
     "makes no instance": r"[Ii]nstantiat",

@@ -112,6 +112,10 @@ def test_tables_count_tools_and_causes(tmp_path: Path) -> None:
     assert lines[3] == "| 20-sim | 1 | 0 | 0 | 0 | 0 |  |  | 1 FMI 1.0 |"
     assert lines[-1] == "| all | 3 | 1 | 2 | 1 | 1 | 1e-03 |  | 1 FMI 1.0 |"
     assert table_of_systems(["", "", "got FMI 1.0"])[-1] == "| 3 | 2 | 1 FMI 1.0 |"
+    assert (
+        cause_of("expected a safe FMU, got: member 'a\\b' has a backslash")
+        == "names of members with backslashes"
+    )
     assert cause_of("a line of no known cause") == OTHER
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- zoo: written by make zoo -->\nold\n<!-- end of zoo -->\nafter\n")
