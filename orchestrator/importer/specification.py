@@ -12,6 +12,8 @@ from vibroimpact.fmus.shipped import package_folder
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
+#: Relative error of a communication step whose size an error estimate chooses.
+COUPLING_TOLERANCE = 1e-6
 RunAs = Literal["auto", "model_exchange", "co_simulation"]
 PairLaw = Literal["restitution", "kelvin_voigt", "hertz", "hunt_crossley"]
 #: Numbers of each law of a pair, besides the clearance.

@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import (
+    COUPLING_TOLERANCE,
     ComponentSpec,
     ConnectionSpec,
     EventSpec,
@@ -26,6 +27,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.scene.body_models import Body, StructureBody
 from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, is_step
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sweeps_frequencies
 from vibroimpact.orchestrator.scene.forcing_models import (
@@ -54,7 +56,6 @@ from vibroimpact.orchestrator.scene.measuring_models import (
 from vibroimpact.orchestrator.scene.models import (
     MOTION_KEYS,
     ContactTable,
-    Execution,
     Record,
     SceneTable,
     Stop,
@@ -139,6 +140,8 @@ class Parts(SceneTable):
             "doubts": self.doubts,
             "remarks": dict(self.remarks),
         }
+        if self.execution.adapts:
+            document["coupling_tolerance"] = self.execution.coupling_tolerance or COUPLING_TOLERANCE
         if self.contacts:  # so that campaigns of versions without contacts go on
             document["contacts"] = [asdict(contact) for contact in self.meetings]
         return document
@@ -255,10 +258,10 @@ class Parts(SceneTable):
 
     @property
     def macro_step(self) -> float:
-        """Time between two exchanges of components, s: as given, the first swept value, or the whole run."""
+        """Time between two exchanges of components, s: as given, the first swept value, or the whole run ("auto")."""
         swept = next((axis.values[0] for axis in self.sweep if is_step(self.components, axis.key)), None)
         whole = self.record.transient_time + self.record.recorded_time
-        return self.execution.macro_step or swept or whole
+        return self.execution.fixed_step or swept or whole
 
     @property
     def sampling_rate(self) -> float:

@@ -46,7 +46,16 @@ def step_problems(draft: GeneralDraft) -> list[Problem]:
     }
     if not limited:
         return []
-    macro_steps = draft.swept_steps() or (draft.execution.macro_step or _duration(draft),)
+    if draft.execution.adapts:
+        return [
+            Problem(
+                STEP_KEY,
+                f"a number, since {name} has steps of its own: {facts.file} ({facts.capabilities.grid})",
+                '"auto"',
+            )
+            for name, facts in limited.items()
+        ]
+    macro_steps = draft.swept_steps() or (draft.execution.fixed_step or _duration(draft),)
     problems = [*_contact_problems(draft, limited), *_event_problems(draft, limited)]
     for macro_step in macro_steps:
         for grid in _grids(limited, macro_step):
