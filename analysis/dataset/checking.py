@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
+    COUPLED_COLUMNS,
     EVENT_COLUMNS,
     NEEDED_IMPACT_COLUMNS,
     RAGGED,
@@ -248,10 +249,12 @@ def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
                     run = int(owner[row])
                     where = f"of {dimension} {row - first[run] + 1}"
                     yield run, f"{name}: expected {expected}, got {values[row]} {where}."
-    if "loop_residual" in dataset.variables:
-        residual = dataset.variables["loop_residual"].values
-        for run in np.flatnonzero((residual < 0) & ~failed).tolist():
-            yield run, f"loop_residual: expected a residual >= 0 or NaN, got {residual[run]}."
+    for name in COUPLED_COLUMNS:
+        if name in dataset.variables:
+            found = dataset.variables[name].values
+            what = "a residual" if name == "loop_residual" else "a number"
+            for run in np.flatnonzero((found < 0) & ~failed).tolist():
+                yield run, f"{name}: expected {what} >= 0 or NaN, got {found[run]}."
 
 
 def _row_checks(

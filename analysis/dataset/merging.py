@@ -12,14 +12,20 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.assembling import assembled, wrapped
 from vibroimpact.analysis.dataset.reading import read_flat
-from vibroimpact.analysis.dataset.schema import IMPACT_COLUMNS, NEEDED_IMPACT_COLUMNS, RAGGED, flat_order
+from vibroimpact.analysis.dataset.schema import (
+    COUPLED_COLUMNS,
+    IMPACT_COLUMNS,
+    NEEDED_IMPACT_COLUMNS,
+    RAGGED,
+    flat_order,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 # Labels that are not along run, the same in all parts.
 _LABELS = frozenset({"connection", "compared"})
 _SHARED_SIZES = ("state", "interface", "comparison")
 # Variables that parts may lack: a part of failed runs has no loops, a part of an older version no durations.
-_MAY_LACK = ("loop_residual", *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
+_MAY_LACK = (*COUPLED_COLUMNS, *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
 # Attributes with the meaning of the values: parts that differ in them cannot be joined.
 _MEANING = ("units", "component_variable", "flag_meanings")
 

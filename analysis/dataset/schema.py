@@ -140,6 +140,8 @@ class RunRecord:
         Interface energy residual of each force-displacement connection, J.
     loop_residual : float or None
         Largest relative residual of the algebraic loops.
+    chosen_steps : ndarray of float, shape (5,), or None
+        Columns `STEP_COLUMNS`: communication steps that an error estimate has chosen.
     final_state : ndarray of float, shape (2 N,), or None
         Whole state of a chain or beam at the end: N displacements (m), then N velocities (m/s), of its masses
         or modes.
@@ -161,6 +163,7 @@ class RunRecord:
     events: NDArray[np.float64] | None = None
     energy_residual: NDArray[np.float64] | None = None
     loop_residual: float | None = None
+    chosen_steps: NDArray[np.float64] | None = None
     final_state: NDArray[np.float64] | None = None
     scores: NDArray[np.float64] | None = None
 
@@ -262,6 +265,11 @@ _RULES = (
         "dominant frequency of the simulation less that of the measurement",
     ),
     VariableRule("loop_residual", ("run",), "1", "largest relative residual of algebraic loops"),
+    VariableRule("coupling_steps", ("run",), "1", "communication steps of chosen sizes"),
+    VariableRule("coupling_rejected", ("run",), "1", "steps taken back for their errors"),
+    VariableRule("coupling_step_min", ("run",), "s", "smallest chosen communication step"),
+    VariableRule("coupling_step_max", ("run",), "s", "largest chosen communication step"),
+    VariableRule("coupling_error", ("run",), "1", "sum of the estimated relative errors of all steps"),
     VariableRule(
         "measurement_flags",
         ("run",),
@@ -336,9 +344,13 @@ ORBIT_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("orbi
 """Columns of runs that are periodic orbits, followed over a parameter."""
 CLASS_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("class_"))
 """Columns of runs that have been classified."""
+STEP_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("coupling_"))
+"""Columns of runs whose communication steps an error estimate has chosen."""
+COUPLED_COLUMNS = ("loop_residual", *STEP_COLUMNS)
+"""Columns of coupled runs that not all have: with algebraic loops, with chosen steps."""
 RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
 # Not in every file: these per-run variables are there only where they were recorded.
-_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS, *ORBIT_COLUMNS, *CLASS_COLUMNS)
+_NOT_IN_ALL = (*RAGGED.values(), *COUPLED_COLUMNS, *MEASURED_COLUMNS, *ORBIT_COLUMNS, *CLASS_COLUMNS)
 RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in _NOT_IN_ALL)
 RESERVED_NAMES = frozenset(
     {*RULES, *(dim for rule in _RULES for dim in rule.dims), *(f"{dim}_run" for dim in RAGGED)}

@@ -35,6 +35,7 @@ from vibroimpact.analysis.dataset.schema import (
     RULES,
     SCHEMA_VERSION,
     SCORE_COLUMNS,
+    STEP_COLUMNS,
     Direction,
     RunRecord,
     UnitSystem,
@@ -359,6 +360,10 @@ def _coupling_variables(
     if any(run.loop_residual is not None for run in runs):
         loops = [np.nan if run.loop_residual is None else run.loop_residual for run in runs]
         variables |= _described({"loop_residual": loops}, units)
+    if any(run.chosen_steps is not None for run in runs):
+        none = np.full(len(STEP_COLUMNS), np.nan)
+        rows = [none if run.chosen_steps is None else run.chosen_steps for run in runs]
+        variables |= _described(dict(zip(STEP_COLUMNS, np.array(rows).T, strict=True)), units)
     return variables
 
 

@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 from vibroimpact.orchestrator.scene import (
     body_models,
     component_models,
+    execution_model,
     forcing_models,
     measuring_models,
     models,
@@ -56,6 +57,7 @@ def models_of_tables() -> dict[str, type[BaseModel]]:
         replay_models,
         sweep_models,
         component_models,
+        execution_model,
     )
     named = (pair for module in modules for pair in vars(module).items())
     return {name: found for name, found in named if isinstance(found, type) and issubclass(found, BaseModel)}

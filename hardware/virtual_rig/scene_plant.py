@@ -13,8 +13,8 @@ from vibroimpact.hardware.virtual_rig.playback import Playback
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 from vibroimpact.orchestrator.run.measuring.session import MeasuredSession
 from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.scene.execution_model import MOST_IMPACTS_PER_POINT
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE
-from vibroimpact.orchestrator.scene.models import MOST_IMPACTS_PER_POINT
 
 MOST_STEPS = 100_000
 """Maximum rows held in memory, of one call of the session."""

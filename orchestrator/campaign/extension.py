@@ -25,7 +25,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.dataset.assembling import assembled, loaded_variable
 from vibroimpact.analysis.dataset.flat_file import FlatFile
-from vibroimpact.analysis.dataset.schema import attributes_of
+from vibroimpact.analysis.dataset.schema import COUPLED_COLUMNS, attributes_of
 from vibroimpact.analysis.files.object_paths import AnyPath
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.manifest import (
@@ -237,9 +237,9 @@ def on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> 
             values[str(name)] = rows.variables[source].values
         if str(name) in values:
             variables[str(name)] = (variable.dims, values[str(name)], variable.attrs)
-    if "loop_residual" in rows.variables:
-        residual = rows.variables["loop_residual"].values
-        variables["loop_residual"] = (("run",), residual, attributes_of("loop_residual", new.units))
+    for name in COUPLED_COLUMNS:
+        if name in rows.variables:
+            variables[name] = (("run",), rows.variables[name].values, attributes_of(name, new.units))
     coords = {str(name): variables.pop(str(name)) for name in like.coords}
     return without_empty_periods(assembled(variables, coords, like.attrs))
 

@@ -44,8 +44,9 @@ class EventfulInstance(Instance):
         self._last_time = c_double()
         outputs = [ctypes.byref(flag) for flag in (self._needs_event, self._ends, self._early)]
         outputs.append(ctypes.byref(self._last_time))
-        prior = c_bool(NO_STATE_PRIOR_TO_POINT)
-        self._do_step = self._bound("DoStep", self._step_time, self._step_size, prior, *outputs)
+        self.no_state_prior = c_bool(NO_STATE_PRIOR_TO_POINT)
+        sizes = self._step_time, self._step_size
+        self._do_step = self._bound("DoStep", *sizes, self.no_state_prior, *outputs)
 
     def take_step(self, status: int) -> int:
         """Read status and flags of the step just made; returns as `step` does."""

@@ -20,8 +20,8 @@ from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual
 from vibroimpact.orchestrator.fmi.variables import DTYPES, TextGroup, VariableGroup
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-#: noSetFMUStatePriorToCurrentPoint of every step. An importer here restores only states saved at the start of the step
-#: or later. With false, some FMUs repeat a last step that was not accepted.
+#: noSetFMUStatePriorToCurrentPoint of every step but the second half of a step on trial. An importer here restores only
+#: states saved at the start of the step or later. With false, some FMUs repeat a last step that was not accepted.
 NO_STATE_PRIOR_TO_POINT = True
 STATUS_WORDS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
@@ -91,8 +91,11 @@ class Instance(ABC):
         Flags of the last `step` (in FMI 2.0 only `wants_to_end`).
     is_flagged : bool
         Any of these three.
+    no_state_prior : c_bool or c_int
+        Argument of the next steps: no state saved before their start will be restored.
     """
 
+    no_state_prior: ctypes.c_bool | ctypes.c_int
     fmi_version: ClassVar[str]
     prefix: ClassVar[str]
     state_word: ClassVar[str]

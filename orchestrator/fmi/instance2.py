@@ -86,9 +86,8 @@ class Instance2(Instance):
             self._instantiate()
         self._keep_rounding()
         self._bind_life()
-        self._do_step = self._bound(
-            "DoStep", self._step_time, self._step_size, c_int(NO_STATE_PRIOR_TO_POINT)
-        )
+        self.no_state_prior = c_int(NO_STATE_PRIOR_TO_POINT)
+        self._do_step = self._bound("DoStep", self._step_time, self._step_size, self.no_state_prior)
         self._bind_states()
 
     def _instantiate(self) -> None:

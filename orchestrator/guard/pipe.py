@@ -67,7 +67,17 @@ class Failure:
 
 _numbers_of = attrgetter("outcome", "final_displacement", "final_velocity", "final_phase", "seconds")
 _NUMBERS = struct.Struct("<b4d")
-_ARRAYS = ("periods", "impacts", "sticks", "samples", "events", "energy_residual", "final_state", "scores")
+_ARRAYS = (
+    "periods",
+    "impacts",
+    "sticks",
+    "samples",
+    "events",
+    "energy_residual",
+    "final_state",
+    "scores",
+    "chosen_steps",
+)
 _arrays_of = attrgetter(*_ARRAYS)
 
 

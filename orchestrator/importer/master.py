@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Literal
 
 from vibroimpact.fmus.core.coupling import CouplingEnd
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.importer.adaptive.coupling import needs_coupling_steps
+from vibroimpact.orchestrator.importer.adaptive.steps import AdaptiveSteps
 from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
 from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS
@@ -24,6 +27,7 @@ from vibroimpact.orchestrator.importer.plain_loop import MOST_SECONDS, Made, Pla
 from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import (
+    COUPLING_TOLERANCE,
     ComponentSpec,
     ConnectionSpec,
     EventSpec,
@@ -33,6 +37,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import MOST_REPETITIONS
+from vibroimpact.orchestrator.importer.trial_steps import TrialSteps
 from vibroimpact.orchestrator.importer.wiring import SettlingInputs
 
 #: Steps without progress after which the run ends in an error.
@@ -44,7 +49,7 @@ STEP_TOLERANCE = 1e-13
 PAIR_REPETITIONS = 100
 
 
-class Importer:
+class Importer(TrialSteps):
     """Couples components.
 
     Parameters
@@ -62,8 +67,10 @@ class Importer:
     exchange : str
         `jacobi`: all inputs have the values of the start of a step. `gauss_seidel`: each component gets the newest
         outputs of components stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
-    macro_step : float
-        Longest communication step, s.
+    macro_step : float or "auto"
+        Longest communication step, s; "auto": steps follow an estimate of their errors.
+    coupling_tolerance : float
+        Relative error of a step with "auto".
     contact_steps : float
         Communication steps that a contact with a yielding stop is divided into (its law is another FMU's). The macro
         step may divide it further.
@@ -90,6 +97,8 @@ class Importer:
         Receives events that may pass, in place of `on_event`; None: `on_event` is called at each event.
     steps_in_c : bool
         Plain steps are made in C, with the same bits as here.
+    adaptive : AdaptiveSteps or None
+        Chooses the steps with "auto"; None with a macro step, and where no connection needs one.
     """
 
     def __init__(
@@ -101,22 +110,28 @@ class Importer:
         pairs: Sequence[PairSpec] = (),
         *,
         exchange: Exchange = "gauss_seidel",
-        macro_step: float = math.inf,
+        macro_step: float | Literal["auto"] = math.inf,
+        coupling_tolerance: float = COUPLING_TOLERANCE,
         contact_steps: float = CONTACT_STEPS,
         divisions: Divisions | None = None,
         log: Callable[[str], LogTail] | None = None,
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
-        divisions = divisions or Divisions((macro_step,))
+        divisions = divisions or Divisions((math.inf if macro_step == "auto" else macro_step,))
         parts = parts_of(
             components, connections, events, contacts, pairs, divisions, contact_steps, log, wrap
         )
         self.components, self._order = parts.named, parts.components
+        self.macro_step = math.inf if macro_step == "auto" else macro_step
         self.watches, self.contacts = parts.watches, parts.contacts
         self.transfers, self.loops = parts.transfers, parts.loops
         self.tuning, self.ticks, self.grids = parts.tuning, parts.ticks, parts.grids
-        self.macro_step, self._progress = macro_step, Progress()
-        self._plan = StepPlan(parts, exchange, self._progress)
+        self._progress = Progress()
+        adapts = macro_step == "auto" and needs_coupling_steps(parts, contacts, pairs)
+        self._plan = StepPlan(parts, exchange, self._progress, tries=adapts)
+        self.adaptive: AdaptiveSteps | None = None
+        if adapts:
+            self.adaptive = AdaptiveSteps(parts, self._plan, exchange, contacts, pairs, coupling_tolerance)
         self.watchers: list[StepWatcher] = []
         self.keeps_start = False
         self.steps_in_c = True
@@ -124,21 +139,6 @@ class Importer:
         self.late_events: LateEvents | None = None
         self.on_pause: Callable[[], None] | None = None
         self._has_started = False
-
-    @property
-    def time(self) -> float:
-        """Time reached, s."""
-        return float(self._progress.time)
-
-    @property
-    def steps(self) -> int:
-        """Communication steps made."""
-        return int(self._progress.steps)
-
-    @property
-    def repeated_steps(self) -> int:
-        """Number of steps that were repeated."""
-        return int(self._progress.repeated_steps)
 
     def plan_moves(self) -> None:
         """Bind the calls of all moves again, after a transfer's buffers changed."""
@@ -178,6 +178,8 @@ class Importer:
         self.contacts.begin(start_time)
         self._note(self.contacts.pairs.resolve(start_time))
         self._tune(start_time)
+        if self.adaptive is not None:
+            self.adaptive.begin(self)
 
     # ---- advancing ----
 
@@ -198,6 +200,9 @@ class Importer:
                 return
             if now.next_point - time <= room:
                 now.pass_point(self.macro_step, room)
+            if self.adaptive is not None:
+                self.adaptive.step(time, min(end, self.ticks.next), end)
+                continue
             seconds = self._seconds_for_c()
             if seconds > 0.0 and (loop := self._plan.plain_loop) is not None:
                 self._make_plain_steps(loop, end, seconds)
@@ -238,6 +243,10 @@ class Importer:
 
     def _step(self, time: float, target: float) -> None:
         """Make a step towards `target`."""
+        self.accept(time, self.attempt(time, target))
+
+    def attempt(self, time: float, target: float) -> float:
+        """Make a step towards `target`, s, that is not concluded yet; returns its planned end."""
         contacts, plan = self.contacts, self._plan
         if contacts:
             target = contacts.begin_step(time, target)
@@ -251,15 +260,24 @@ class Importer:
         self.grids.take_inputs(time)
         for watcher in self.watchers:
             watcher.before(time)
-        self._finish(time, target, self._step_all(time, target))
+        self._settle(time, self._step_all(time, target))
+        return target
 
     def _finish(self, time: float, target: float, overtaken: float | None) -> None:
         """Finish a step that all have made, or that ended at `overtaken` with some components past this time."""
-        contacts = self.contacts
+        self._settle(time, overtaken)
+        self.accept(time, target)
+
+    def _settle(self, time: float, overtaken: float | None) -> None:
+        """Repeat a step until all that can go back agree on its end."""
         if overtaken is not None or self._plan.iterates:
             self._agree(time, overtaken)
-        if contacts.active:
+        if self.contacts.active:
             self._settle_contacts(time)
+
+    def accept(self, time: float, target: float) -> None:
+        """Conclude a step: components that cannot go back make it, and its events are resolved."""
+        contacts = self.contacts
         while self._plan.stateless_paths and self._reached > time:
             contacts.agree(time, self._reached)
             if (overtaken := self._step_stateless(time, self._reached)) is None:
@@ -304,23 +322,6 @@ class Importer:
         if self._plan.saves or self.keeps_start or self.contacts.active:
             self._save_start()
 
-    def _solve_loops(self, time: float) -> None:
-        self.loops.solve(time)
-        for transfer in self._plan.looping:
-            transfer.take()
-        self._plan.moves_after_loops()
-        self.loops.hold()
-
-    def _save_start(self) -> None:
-        for component in self._plan.saved:
-            component.instance.save(component.at_start)
-        for watch in self.watches:
-            watch.note_start()
-
-    def _restore_start(self) -> None:
-        for component in self._plan.saved:
-            component.instance.restore(component.at_start)
-
     def _agree(self, time: float, end: float | None) -> None:
         """Repeat a step until all components have reached one instant; `end` is the time of the first event."""
         while end is not None or (end := self._iterate(time)) is not None:
@@ -329,7 +330,7 @@ class Importer:
             if end <= time:
                 self._stay(time)
                 return
-            self._restore_start()
+            self.take_back()
             end = self._step_all(time, end)
 
     def _settle_contacts(self, time: float) -> None:
@@ -339,7 +340,7 @@ class Importer:
             if end is None or self._reached <= time:
                 return
             self._progress.repeated_steps += 1
-            self._restore_start()
+            self.take_back()
             self.contacts.apply()
             self._save_start()
             overtaken = self._step_all(time, end)
@@ -464,7 +465,7 @@ class Importer:
             self.loops.solve(target)
             if inputs.have_settled():
                 break
-            self._restore_start()
+            self.take_back()
             for transfer in self.transfers:
                 transfer.write_over_step(target - time)
             if self.contacts.active:
@@ -495,6 +496,8 @@ class Importer:
 
     def free(self) -> None:
         """Free all components."""
+        if self.adaptive is not None:
+            self.adaptive.free()
         self.contacts.free()
         for component in self.components.values():
             component.free()

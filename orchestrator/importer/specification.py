@@ -13,6 +13,8 @@ from vibroimpact.orchestrator.remote.address import FmuServer
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
+#: Relative error of a communication step whose size an error estimate chooses.
+COUPLING_TOLERANCE = 1e-6
 RunAs = Literal["auto", "model_exchange", "co_simulation"]
 StartValue = float | int | bool | str | tuple[float | int | bool | str, ...]
 """A start value; an array has its elements in a row, the last dimension fastest."""

@@ -23,6 +23,8 @@ class StepPlan:
         The exchange of values: `jacobi`, `gauss_seidel` or `iterated`.
     progress : Progress
         Time, communication points and counts of the run.
+    tries : bool
+        Any step may be tried, and taken back.
 
     Attributes
     ----------
@@ -34,8 +36,8 @@ class StepPlan:
         The components with states.
     looping : list of Transfer
         The transfers that loops solve for.
-    start_moves, moves_after_loops : CallList or None, CallList
-        Moves before a step, and after its loops are solved.
+    start_moves, moves_after_loops, trial_moves : CallList or None, CallList, CallList
+        Moves before a step, after its loops are solved, and around steps that are taken back.
     paths : list of (Component, CallList or None)
         The components that step together, each with the moves before its step.
     stateless_paths : list of (Component, CallList or None)
@@ -44,13 +46,14 @@ class StepPlan:
         Resolves events.
     """
 
-    def __init__(self, parts: Parts, exchange: Exchange, progress: Progress) -> None:
+    def __init__(self, parts: Parts, exchange: Exchange, progress: Progress, *, tries: bool = False) -> None:
+        self._tries = tries
         self._parts, self._progress = parts, progress
         order = parts.components
         sources = [c for c in order if c.event_mode or self._is_looked_at(c)]
         is_alone = len(sources) == 1 and sources[0] is order[0] and sources[0].event_mode
         self.iterates = exchange == "iterated"
-        self.saves = self.iterates or not (is_alone or not sources)
+        self.saves = self.iterates or tries or not (is_alone or not sources)
         self.saved = [c for c in order if c.has_states]
         self._is_jacobi = exchange == "jacobi"
         self.plan_moves()
@@ -74,9 +77,10 @@ class StepPlan:
         behind = [t for t in parts.transfers if t not in refreshed]
         self.start_moves = moves_of(t for t in behind if t not in self.looping) or None
         self.moves_after_loops = moves_of(straight)
+        self.trial_moves = moves_of(t for t in straight if t.target.has_states)
         paths = [(c, moves_of(fresh[c.name]) or None) for c in together]
         # components that cannot go back wait for the last repetition
-        repeats = self.iterates or bool(parts.contacts)
+        repeats = self.iterates or self._tries or bool(parts.contacts)
         waiting = [path for path in paths if repeats and not self._steps_at_once(path[0])]
         self.paths = [path for path in paths if path not in waiting]
         self.stateless_paths = waiting
@@ -87,7 +91,7 @@ class StepPlan:
     def _steps_at_once(self, component: Component) -> bool:
         """Does the component step with the others: can it go back, or does it find its own impacts at a stop?"""
         found = [bond.body for bond in self._parts.contacts.held if bond.body.kind == "model_exchange"]
-        return component.has_states or (component in found and not self.iterates)
+        return component.has_states or (component in found and not (self.iterates or self._tries))
 
     def keep_up(self) -> None:
         """Plan the moves again if initialization has found algebraic loops that no list declares, or no longer has."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import re
 import time
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, LateComponentError, LostComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
+from vibroimpact.orchestrator.importer.adaptive.aliasing import SampledRates
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts, impact_rows
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
@@ -21,7 +23,7 @@ from vibroimpact.orchestrator.importer.events import Event, LateEvents
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.own_grid import Divisions, step_remarks
 from vibroimpact.orchestrator.importer.sampling import Sampler
-from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.importer.specification import COUPLING_TOLERANCE, PairSpec
 from vibroimpact.orchestrator.run.empty_record import MOST_CONTACTS, empty_record, records_impacts
 from vibroimpact.orchestrator.run.record import (
     Deadline,
@@ -93,7 +95,8 @@ class GeneralRunner(Runner):
             scene.stop_contacts,
             scene.pairs,
             exchange=scene.execution.exchange,
-            macro_step=scene.macro_step,
+            macro_step="auto" if scene.execution.adapts else scene.macro_step,
+            coupling_tolerance=scene.execution.coupling_tolerance or COUPLING_TOLERANCE,
             divisions=_divisions(scene),
             log=self._log,
             wrap=self._wrap,
@@ -105,6 +108,7 @@ class GeneralRunner(Runner):
         self._importer.watchers.append(self._deadline.watcher)
         self._energy = InterfaceEnergy(self._importer, scene.connections)
         self._sampler = self._make_sampler(scene)
+        self._rates = SampledRates(self._importer)
         self._broken = self._is_freed = False
 
     def _make_sampler(self, scene: Scene) -> Sampler | None:
@@ -160,7 +164,7 @@ class GeneralRunner(Runner):
         for component in self._importer.components.values():
             component.instance.log.take()  # discard messages of the point before
         self._set_gains(scene)
-        self._importer.macro_step = scene.macro_step
+        self._importer.macro_step = math.inf if scene.execution.adapts else scene.macro_step
         self._importer.contacts.take_numbers(scene.stop_contacts, scene.pairs)
         start_time = scene.start_time
         first = start_time + record.transient_time
@@ -207,6 +211,7 @@ class GeneralRunner(Runner):
             )
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
         remarks += [*self._importer.loops.remarks(), *self._importer.ticks.remarks()]
+        remarks += self._rates.remarks()
         remarks += [
             f"{name} made no instance with the event mode that it declares, and ran without"
             for name, component in self._importer.components.items()
@@ -305,6 +310,7 @@ class GeneralRunner(Runner):
             else None,
             impacts=impact_rows(self._impacts) if records_impacts(self.scene) else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
+            chosen_steps=None if self._importer.adaptive is None else self._importer.adaptive.record.row(),
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
         )
 

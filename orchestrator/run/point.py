@@ -217,7 +217,7 @@ def driver_of(
         # imported only for coupled execution
         from vibroimpact.orchestrator.run.coupled import CoupledDriver
 
-        step = scene.execution.macro_step
+        step = scene.execution.fixed_step
         return CoupledDriver(
             floats,
             integers,

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, PairSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.specification import (
+    COUPLING_TOLERANCE,
+    ComponentSpec,
+    PairSpec,
+    StopContactSpec,
+)
 from vibroimpact.orchestrator.run.called_effects import called_by_components, called_by_numbers, shipped_kind
 from vibroimpact.orchestrator.run.limits import goes_by_lanes
 from vibroimpact.orchestrator.run.parameters import body_points
@@ -39,14 +44,21 @@ def engine(scene: Scene, execution: str = "auto") -> str:
     """
     if not scene.is_one_body:
         names = ", ".join(map(_named, scene.components))
-        step = f"{scene.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
-        return f"coupled: {names}; {scene.execution.exchange} exchange every {step}"
+        return f"coupled: {names}; {scene.execution.exchange} exchange {_steps(scene)}"
     if scene.replay is not None:
         return f"replay from sample to sample: {_body(scene)}"
     if scene.execution.how == "coupled":
         return f"coupled: {_body(scene)}{'; an ImpactStop for each stop' if scene.stops else ''}"
     by_lanes = goes_by_lanes(scene) if execution == "auto" else execution == "lanes"
     return f"{'lanes, many points at once' if by_lanes else 'fused'}: {_body(scene)}"
+
+
+def _steps(scene: Scene) -> str:
+    """Return the communication steps of a scene of components in words."""
+    if scene.execution.adapts:
+        tolerance = scene.execution.coupling_tolerance or COUPLING_TOLERANCE
+        return f"in steps with an error of {tolerance:g}"
+    return f"every {scene.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
 
 
 def _named(component: ComponentSpec) -> str:

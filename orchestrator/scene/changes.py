@@ -202,7 +202,15 @@ def _refuse_misfit(owner: Any, part: str | int, change: Change, depth: int) -> N
 
 
 def _leave_out_alternatives(document: dict[str, Any], changes: Sequence[Change]) -> None:
-    keys = {change.path for change in changes}
+    keys, execution = {change.path for change in changes}, document.get("execution")
+    step, tolerance = ("execution", "macro_step"), ("execution", "coupling_tolerance")
+    if (
+        step in keys
+        and tolerance not in keys
+        and isinstance(execution, dict)
+        and execution["macro_step"] != "auto"
+    ):
+        execution.pop("coupling_tolerance", None)  # it belongs to chosen steps
     for change in changes:
         table, name = change.path[:-1], change.path[-1]
         other = ALTERNATIVES.get(name) if isinstance(name, str) else None

@@ -45,9 +45,10 @@ from vibroimpact.orchestrator.scene.components import (
     start_problems,
 )
 from vibroimpact.orchestrator.scene.draft import Reading
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
-from vibroimpact.orchestrator.scene.models import Execution, Record, TimeSeries
+from vibroimpact.orchestrator.scene.models import Record, TimeSeries
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.components import general_problems, reference_problem
 from vibroimpact.orchestrator.scene.rules.contacts import contact_problems, velocity_input

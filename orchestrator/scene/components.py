@@ -43,8 +43,8 @@ from vibroimpact.orchestrator.scene.component_numbers import (
     gain_place,
 )
 from vibroimpact.orchestrator.scene.draft import DraftTables
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import rule_of
-from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted, read_table
 from vibroimpact.orchestrator.scene.served_components import is_served, refuse_version, served_component
 

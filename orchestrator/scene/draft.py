@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.scene.body_models import (
     StructureBody,
 )
 from vibroimpact.orchestrator.scene.body_models.structure import observed_variables
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.forcing_clock import (
     Clock,
@@ -40,7 +41,6 @@ from vibroimpact.orchestrator.scene.models import (
     CONTACT_MODELS,
     STOP_MODELS,
     Contact,
-    Execution,
     OwnStop,
     Record,
     SceneHeader,

@@ -11,10 +11,11 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import field_name, field_of, is_whole, known_keys, numeric_keys
 from vibroimpact.orchestrator.scene.forcing_models import FORCING_MODELS
 from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
-from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS, Execution
+from vibroimpact.orchestrator.scene.models import CONTACT_MODELS, STOP_MODELS
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),

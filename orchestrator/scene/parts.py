@@ -19,6 +19,7 @@ from pydantic.fields import FieldInfo
 from vibroimpact.analysis.dataset.sample_forms import SampleForm
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import (
+    COUPLING_TOLERANCE,
     ComponentSpec,
     ConnectionSpec,
     EventSpec,
@@ -27,6 +28,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.scene.body_models import Body, StructureBody
 from vibroimpact.orchestrator.scene.component_numbers import ComponentNumbers, is_step
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.forcing_clock import Clock, clock_of, sweeps_frequencies
 from vibroimpact.orchestrator.scene.forcing_models import (
@@ -55,7 +57,6 @@ from vibroimpact.orchestrator.scene.measuring_models import (
 from vibroimpact.orchestrator.scene.models import (
     MOTION_KEYS,
     ContactTable,
-    Execution,
     Record,
     SceneTable,
     Stop,
@@ -152,6 +153,8 @@ class Parts(SceneTable):
         }
         if self.start_time != 0.0:
             document["start_time"] = self.start_time
+        if self.execution.adapts:
+            document["coupling_tolerance"] = self.execution.coupling_tolerance or COUPLING_TOLERANCE
         if self.contacts:  # so that campaigns of versions without contacts go on
             document["contacts"] = [asdict(contact) for contact in self.meetings]
         return document
@@ -268,10 +271,10 @@ class Parts(SceneTable):
 
     @property
     def macro_step(self) -> float:
-        """Time between two exchanges of components, s: as given, the first swept value, or the whole run."""
+        """Time between two exchanges of components, s: as given, the first swept value, or the whole run ("auto")."""
         swept = next((axis.values[0] for axis in self.sweep if is_step(self.components, axis.key)), None)
         whole = self.record.transient_time + self.record.recorded_time
-        return self.execution.macro_step or swept or whole
+        return self.execution.fixed_step or swept or whole
 
     @property
     def sampling_rate(self) -> float:

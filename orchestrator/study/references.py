@@ -19,7 +19,7 @@ from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 from vibroimpact.orchestrator.study.ways.replays import span_of
 from vibroimpact.orchestrator.study.ways.span import first_part, window_of
-from vibroimpact.orchestrator.study.ways.way import opened_trial
+from vibroimpact.orchestrator.study.ways.way import opened_trial, own_step
 
 DISTURBANCE = 1e-9
 """Relative change of a number of the scene that measures the sensitivity of its motion."""
@@ -75,7 +75,7 @@ def _finest_exchange(scene: Scene) -> Reference:
     Runs at twice and four times this step give the error of the reference: the first its size, both its order. Runs at
     the scene's own step decide whether the motion is chaotic.
     """
-    scales, own, best = scales_of(scene), scene.macro_step, best_of(scene)
+    scales, own, best = scales_of(scene), own_step(scene), best_of(scene)
     steps = [{"execution.macro_step": own * FINEST_STEP * part} for part in (4.0, 2.0)]
     coarse, middle = (observed(best.with_values(step)) for step in steps)
     finest = observed(best)
@@ -93,7 +93,7 @@ def _finest_exchange(scene: Scene) -> Reference:
 def best_of(scene: Scene) -> Scene:
     """Return the scene of the reference run: fused, with the finest tolerance of contacts, or the finest exchange."""
     if not scene.is_one_body:
-        step = scene.macro_step * FINEST_STEP
+        step = own_step(scene) * FINEST_STEP
         return scene.with_values({"execution.macro_step": step, "execution.exchange": "iterated"})
     best = scene.with_values({"execution.how": "fused"})
     return (

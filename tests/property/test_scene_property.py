@@ -16,9 +16,10 @@ from support.scenes import problems_of
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.forcing_models import Forcing
-from vibroimpact.orchestrator.scene.models import Execution, Record, RestitutionStop, SceneHeader
+from vibroimpact.orchestrator.scene.models import Record, RestitutionStop, SceneHeader
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MODELS: dict[str, type[BaseModel]] = {

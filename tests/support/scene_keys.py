@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 
 from vibroimpact.orchestrator.scene import component_models, measuring_models, models, sweep_models
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, LinkTable
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import bounds_of, choices_of, forms_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.forcing_models import FORCING_MODELS
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE
@@ -22,7 +23,7 @@ BOTH: Tables = {
     "[scene]": models.SceneHeader,
     "[sweep] KEY": sweep_models.AxisTable,
     "[sweep] sample": sweep_models.SampleTable,
-    "[execution]": models.Execution,
+    "[execution]": Execution,
 }
 SHORT: Tables = {
     **{f"[body] kind = {kind}": model for kind, model in BODY_MODELS.items()},

@@ -37,7 +37,12 @@ from vibroimpact.orchestrator.campaign.destination import (
 from vibroimpact.orchestrator.campaign.extension import Kept, is_of, kept_path
 from vibroimpact.orchestrator.campaign.manifest import Manifest
 from vibroimpact.orchestrator.campaign.parts import Note, StoredPart
-from vibroimpact.orchestrator.campaign.stores.sealing import OPTIONAL, GrowingStore, read_shard, write_shard
+from vibroimpact.orchestrator.campaign.stores.sealing import (
+    GrowingStore,
+    optional_columns,
+    read_shard,
+    write_shard,
+)
 from vibroimpact.orchestrator.campaign.stores.seals import (
     FINISHED,
     STORE,
@@ -145,8 +150,8 @@ class GrownStore(Destination):
         axes, cells = dict(self._cells.axes), self._cells.cells
         like = with_constants_of(empty_dataset(scene), scene).assign_attrs(scene_hash=self._hash)
         if not scene.is_one_body:
-            empty = new_variable("run", np.empty(1), attributes_of("loop_residual", scene.units))
-            like = like.assign(loop_residual=empty)
+            for name in optional_columns(scene):
+                like[name] = new_variable("run", np.empty(1), attributes_of(name, scene.units))
         if "direction" not in axes and not cells.is_line:
             axes["direction"] = new_variable(
                 (), np.asarray("independent"), {"long_name": RULES["direction"].long_name}
@@ -303,7 +308,9 @@ class GrownStore(Destination):
         """Write what is known at the end only, the consolidated metadata, and the seal of the finished store."""
         (self._seals / FINISHED).unlink(missing_ok=True)
         seals = list(self._sealed.values())
-        absent = [name for name in OPTIONAL if all(name in seal.absent for seal in seals)]
+        absent = [
+            name for name in optional_columns(self._scene) if all(name in seal.absent for seal in seals)
+        ]
         writer = StoreWriter(self.path)
         runs = sum(seal.stop - seal.first for seal in seals)
         sizes = {"period": max(seal.periods for seal in seals), "run": runs}

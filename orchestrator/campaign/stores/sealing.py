@@ -18,7 +18,7 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.analysis.dataset.assembling import assembled
-from vibroimpact.analysis.dataset.schema import attributes_of
+from vibroimpact.analysis.dataset.schema import COUPLED_COLUMNS, attributes_of
 from vibroimpact.analysis.dataset.stores.store import StoreWriter
 from vibroimpact.analysis.files.object_paths import AnyPath, located
 from vibroimpact.orchestrator.campaign.stores.seals import SEALS, STORE, Seal, write_seal
@@ -28,8 +28,10 @@ from vibroimpact.orchestrator.run.points import columns_of_points
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
-OPTIONAL = ("loop_residual",)
-"""Variables of a store that no run may have."""
+
+def optional_columns(scene: Scene) -> tuple[str, ...]:
+    """Return the variables of a scene's store that no run may have."""
+    return COUPLED_COLUMNS if scene.execution.adapts else ("loop_residual",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ def write_shard(
         outcomes={Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)},
         has_messages=any(rows.variables["message"].values.tolist()),
         periods=rows.sizes.get("period", 0),
-        absent=tuple(name for name in OPTIONAL if name not in rows.variables),
+        absent=tuple(name for name in COUPLED_COLUMNS if name not in rows.variables),
         objects=objects,
     )
     write_seal(store.seals, seal)
@@ -115,14 +117,16 @@ def read_shard(store: GrowingStore, scene: Scene, seal: Seal) -> xr.Dataset:
         points = columns_of_points(expand(scene), shard.first, shard.stop)
         values |= {name: points.values[key] for key, name in coordinate_names(scene).items()}
         values |= {"direction": points.direction}
-    names = {str(name) for name in (*like.variables, *OPTIONAL)} - values.keys() - set(seal.absent)
+    names = (
+        {str(name) for name in (*like.variables, *optional_columns(scene))} - values.keys() - set(seal.absent)
+    )
     writer = _writer(str(store.path), str(seal.attrs["scene_hash"]))
     values |= writer.read_shard(shard.block, names, cells.places(shard))
     variables: dict[str, Any] = {
         str(name): variable if str(name) not in values else (variable.dims, values[str(name)], variable.attrs)
         for name, variable in like.variables.items()
     }
-    for name in OPTIONAL:
+    for name in optional_columns(scene):
         if name in values:
             variables[name] = (("run",), values[name], attributes_of(name, scene.units))
     coords = {str(name): variables.pop(str(name)) for name in like.coords}

@@ -29,6 +29,7 @@ from vibroimpact.orchestrator.scene.component_models import (
     ConnectionTable,
 )
 from vibroimpact.orchestrator.scene.component_numbers import (
+    STEP_KEY,
     component_variable,
 )
 from vibroimpact.orchestrator.scene.components import GeneralDraft, not_restorable
@@ -332,7 +333,14 @@ def _exchange_has_a_step(draft: GeneralDraft) -> Iterator[Problem]:
     if draft.execution is None:
         return
     swept = draft.swept_steps()
-    step = min(swept) if swept else draft.execution.macro_step
+    if draft.execution.adapts:
+        if swept:
+            yield Problem(STEP_KEY, "a number where it is swept", '"auto"', "Remove it, or its sweep.")
+        return
+    if draft.execution.coupling_tolerance is not None:
+        got = quoted(draft.execution.coupling_tolerance)
+        yield Problem("execution.coupling_tolerance", 'macro_step = "auto" beside it', got)
+    step = min(swept) if swept else draft.execution.fixed_step
     if step is None:
         if draft.connections or draft.contacts:
             hint = "Add macro_step = ... to [execution]: the time between two exchanges of values."

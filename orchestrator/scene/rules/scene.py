@@ -30,6 +30,7 @@ MOST_POINTS = 10**9
 PERIOD_KEYS = ("transient_periods", "recorded_periods")
 TIME_KEYS = ("transient_time", "recorded_time")
 COUPLING_KEYS = ("macro_step", "exchange", "guard")
+ADAPTIVE_HINT = "Only a scene of components has steps that an error estimate chooses."
 DraftRule = Callable[[Draft], Iterator[Problem]]
 
 
@@ -79,6 +80,12 @@ def _recording_rules(draft: Draft) -> Iterator[DraftRule]:
 
 def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
     execution = draft.written("execution")
+    if execution.get("macro_step") == "auto":
+        yield Problem("execution.macro_step", "a number in a scene of one body", '"auto"', ADAPTIVE_HINT)
+    if "coupling_tolerance" in execution:
+        got = quoted(execution["coupling_tolerance"])
+        expected = "no coupling_tolerance in a scene of one body"
+        yield Problem("execution.coupling_tolerance", expected, got, ADAPTIVE_HINT)
     how = execution.get("how", "auto")
     if how not in ("auto", "fused"):
         return

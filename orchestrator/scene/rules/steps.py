@@ -28,6 +28,15 @@ def step_problems(draft: GeneralDraft) -> list[Problem]:
         for name, component in draft.components.items()
         if component.facts is not None and component.facts.capabilities.grid
     }
+    if draft.execution.adapts:
+        return [
+            Problem(
+                STEP_KEY,
+                f"a number, since {name} has steps of its own: {facts.file} ({facts.capabilities.grid})",
+                '"auto"',
+            )
+            for name, facts in limited.items()
+        ]
     problems = [*_contact_problems(draft, limited), *_event_problems(draft, limited)]
     for name, facts in limited.items():
         if not facts.capabilities.variable_steps:

@@ -22,7 +22,15 @@ from vibroimpact.orchestrator.study.ways.replays import ReplayTrial, rates_of
 from vibroimpact.orchestrator.study.ways.revision import RevisedTrial
 from vibroimpact.orchestrator.study.ways.sampled import SampledTrial
 from vibroimpact.orchestrator.study.ways.trials import CoupledTrial, ModelExchangeTrial
-from vibroimpact.orchestrator.study.ways.way import Opener, Trial, Way, time_scale, way_by_scene
+from vibroimpact.orchestrator.study.ways.way import (
+    Opener,
+    Trial,
+    Way,
+    can_have,
+    own_step,
+    time_scale,
+    way_by_scene,
+)
 
 CONTACT_TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 INTEGRATOR_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
@@ -31,6 +39,8 @@ STEPS_A_PERIOD = (23, 61, 211, 1009, 5003)
 that steps do not fall on the same phases in each period."""
 GENERAL_REFINEMENTS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
 """Macro steps of a general scene, over its own macro step."""
+COUPLING_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+"""Tolerances of the steps of a general scene that an error estimate chooses."""
 COUPLED_REFINEMENTS = (math.nan, 1e-2, 1e-3)
 """Macro steps of coupled compliant contacts, over the period; NaN: only the steps of the contact itself."""
 LEAST_SAMPLES, MOST_SAMPLES = 64, 10**6
@@ -276,8 +286,8 @@ def _integrated(scene: Scene) -> list[Way]:
 
 
 def _general_ways(scene: Scene) -> list[Way]:
-    own = scene.macro_step
-    return [
+    own = own_step(scene)
+    fixed = [
         way_by_scene(
             f"coupled, {exchange}",
             "macro_step",
@@ -287,6 +297,20 @@ def _general_ways(scene: Scene) -> list[Way]:
         )
         for exchange in EXCHANGES
         for part in GENERAL_REFINEMENTS
+    ]
+    chosen: dict[str, Any] = {"execution.macro_step": "auto"}
+    if not scene.connections or not can_have(scene, chosen):
+        return fixed
+    return fixed + [
+        way_by_scene(
+            f"chosen steps, {exchange}",
+            "coupling_tolerance",
+            tolerance,
+            scene,
+            {**chosen, "execution.exchange": exchange, "execution.coupling_tolerance": tolerance},
+        )
+        for exchange in EXCHANGES
+        for tolerance in COUPLING_TOLERANCES
     ]
 
 

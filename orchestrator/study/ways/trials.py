@@ -48,7 +48,7 @@ class CoupledTrial:
         stops = len(scene.stops)
         body = ComponentSpec(BODY, fmu_path(scene.body.FMU, version), body_integers(integers))
         links = connections_of(stops)
-        step = scene.execution.macro_step
+        step = scene.execution.fixed_step
         self._importer = Importer(
             [body, *(stop_of(k, integers, version) for k in range(1, stops + 1))],
             links,

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol
 
 from vibroimpact.fmus.errors import SceneError
@@ -83,6 +84,20 @@ class SceneTrial:
     def close(self) -> None:
         """Free the components."""
         self._runner.close()
+
+
+@lru_cache(maxsize=4)
+def own_step(scene: Scene) -> float:
+    """Return the macro step of a scene of components, s; the mean step of a run where an estimate chooses the steps."""
+    if not scene.execution.adapts:
+        return scene.macro_step
+    runner = open_runner(scene, scene.execution.how)
+    try:
+        record = runner.run({})
+    finally:
+        runner.close()
+    steps = 1.0 if record.chosen_steps is None else max(1.0, float(record.chosen_steps[0]))
+    return scene.macro_step / steps
 
 
 class CallCounter:

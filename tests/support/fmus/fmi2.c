@@ -252,6 +252,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
         return fmi2Error;
     }
     memcpy(&of(c)->m, state, sizeof(model));
+    of(c)->before = of(c)->m; /* no step that could be repeated leads to a restored state */
     of(c)->terminated = false;
     return fmi2OK;
 }

@@ -268,6 +268,7 @@ fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
         return fmi3Error;
     }
     memcpy(&of(c)->m, state, sizeof(model));
+    of(c)->before = of(c)->m; /* no step that could be repeated leads to a restored state */
     return fmi3OK;
 }
 

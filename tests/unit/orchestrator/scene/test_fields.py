@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.body_models import (
     StructureBody,
 )
 from vibroimpact.orchestrator.scene.component_facts import component_facts
+from vibroimpact.orchestrator.scene.execution_model import Execution
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
 
 KEY_TABLES = run_path(str(ROOT / "docs" / "site" / "key_tables.py"))
@@ -113,7 +114,7 @@ def test_every_field_says_what_it_expects(model: type[BaseModel]) -> None:
     ],
 )
 def test_constraints_are_said_in_words(key: str, expected: str, item: str) -> None:
-    order = (BeamBody, OscillatorBody, models.StopTable, models.Execution)
+    order = (BeamBody, OscillatorBody, models.StopTable, Execution)
     model = next(model for model in order if key in known_keys(model))
     rule = rule_of(field_of(model, key))
     assert (rule.expected, rule.item) == (expected, item)

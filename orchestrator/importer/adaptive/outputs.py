@@ -1,0 +1,126 @@
+"""The values that an error estimate compares: connected outputs and named states, each with its scale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.orchestrator.importer.component import Component, kind_of
+
+Floats = NDArray[np.float64]
+REAL_KINDS = ("Float64", "Float32")
+#: Difference that counts as rounding, over the largest value with the same unit.
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+#: Scale of values that have always been 0.
+SMALLEST = float(np.finfo(np.float64).tiny)
+
+
+class Outputs:
+    """Real variables of components: read together, each with the largest value so far as its scale.
+
+    Parameters
+    ----------
+    variables : iterable of (Component, str, str)
+        Component, variable, and its name in messages. Others than single real numbers are left out.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names in messages.
+    known : ndarray, shape (variable,)
+        Largest absolute value so far of each.
+    since : ndarray, shape (variable,)
+        Time from which each has had a value other than 0, s; infinite before.
+    """
+
+    def __init__(self, variables: Iterable[tuple[Component, str, str]]) -> None:
+        grouped: dict[tuple[str, str], tuple[Component, dict[str, str]]] = {}
+        for component, variable, name in variables:
+            kind = kind_of(component.variables[variable])
+            plain = not (component.variables[variable].dimensions or component.clocks_of(variable))
+            if kind in REAL_KINDS and plain:
+                grouped.setdefault((component.name, kind), (component, {}))[1].setdefault(variable, name)
+        self._groups = [component.group(kind, [*found]) for (_, kind), (component, found) in grouped.items()]
+        self.names = tuple(name for _, found in grouped.values() for name in found.values())
+        units = [
+            _unit(component, v) or name for component, found in grouped.values() for v, name in found.items()
+        ]
+        places = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
+        self._unit = np.array([places[unit] for unit in units], dtype=np.intp)
+        self._unit_count = len(places)
+        self.begin(0.0)
+
+    def __len__(self) -> int:
+        """Return the number of variables."""
+        return len(self.names)
+
+    def begin(self, window: float) -> None:
+        """Forget all scales; an output has none in the first `window` s of its motion, only an outlook."""
+        self._window = window
+        self.known = np.zeros(len(self.names))
+        self.since = np.full(len(self.names), np.inf)
+        self._rounding = np.zeros(len(self.names))
+        self._all_known = np.inf
+
+    def read(self) -> Floats:
+        """Return the present values, shape (variable,)."""
+        return np.concatenate([group.get() for group in self._groups], dtype=np.float64)
+
+    def learn(self, time: float, values: Floats) -> None:
+        """Take values of an accepted instant, s, into the scales."""
+        sizes = np.abs(values)
+        larger = (sizes > self.known) & (sizes < np.inf)
+        if not larger.any():
+            return
+        self.since[larger & (self.known == 0.0)] = time
+        self._all_known = float(self.since.max()) + self._window
+        self.known[larger] = sizes[larger]
+        largest = np.zeros(self._unit_count)
+        np.maximum.at(largest, self._unit, self.known)
+        self._rounding = ROUNDING * largest[self._unit]
+
+    def difference(self, one: Floats, other: Floats) -> Floats:
+        """Return the absolute differences beyond rounding; infinite where one value alone is finite."""
+        beyond = np.maximum(np.abs(one - other) - self._rounding, 0.0)
+        if np.isfinite(beyond).all():
+            return beyond
+        same = (one == other) | (np.isnan(one) & np.isnan(other))
+        return np.where(same, 0.0, np.where(np.isfinite(one) & np.isfinite(other), beyond, np.inf))
+
+    def over_scale(self, errors: Floats, before: Floats, after: Floats, end: float, size: float) -> Floats:
+        """Return errors of a step over the scales of their variables.
+
+        A value that grows from 0 has no size yet. In the first `window` s of its motion its scale is at least its slope
+        times the rest of this time.
+
+        Parameters
+        ----------
+        errors : ndarray, shape (variable,)
+            Absolute errors.
+        before, after : ndarray, shape (variable,)
+            Values at the start and at the end of the step.
+        end, size : float
+            End and length of the step, s.
+        """
+        scale = np.fmax(self.known, np.abs(after))
+        if end < self._all_known:
+            slope = np.abs(after - before) / size
+            scale = np.fmax(scale, np.where(self.rises(after, end), slope * self._left(end), 0.0))
+        ratio = errors / np.fmax(scale, SMALLEST)
+        return ratio if np.isfinite(scale).all() else np.where(errors == 0.0, 0.0, np.inf)
+
+    def rises(self, values: Floats, time: float) -> NDArray[np.bool_]:
+        """Return which variables are at a new largest value within the first `window` s of their motion."""
+        return np.asarray((self._left(time) > 0.0) & (np.abs(values) > self.known))
+
+    def _left(self, time: float) -> Floats:
+        """Return the rest of the first `window` s of each motion, s."""
+        return np.maximum(self._window - np.maximum(time - self.since, 0.0), 0.0)
+
+
+def _unit(component: Component, name: str) -> str:
+    variable = component.variables[name]
+    declared = variable.declaredType
+    return str(variable.unit or (declared.unit if declared is not None else None) or "")

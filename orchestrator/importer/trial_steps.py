@@ -1,0 +1,107 @@
+"""The results of an importer's step, the saved start of it, and steps on trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Self
+
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.events import StepWatcher
+from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
+from vibroimpact.orchestrator.importer.plain_loop import Made
+from vibroimpact.orchestrator.importer.progress import Progress
+from vibroimpact.orchestrator.importer.revision import Watch
+from vibroimpact.orchestrator.importer.step_plan import StepPlan
+
+
+class TrialSteps:
+    """The base of an importer, which makes the steps themselves."""
+
+    loops: LoopSolver
+    watches: Sequence[Watch]
+    watchers: list[StepWatcher]
+    _plan: StepPlan
+    _progress: Progress
+    _at_event: list[Component]
+    _reached: float
+
+    def _prepare(self, time: float) -> None:
+        raise NotImplementedError
+
+    def _step_all(self, time: float, target: float, made: Made | None = None) -> float | None:
+        raise NotImplementedError
+
+    def _settle(self, time: float, overtaken: float | None) -> None:
+        raise NotImplementedError
+
+    @property
+    def time(self) -> float:
+        """Time reached, s."""
+        return float(self._progress.time)
+
+    @property
+    def steps(self) -> int:
+        """Communication steps made."""
+        return int(self._progress.steps)
+
+    @property
+    def repeated_steps(self) -> int:
+        """Number of steps that were repeated."""
+        return int(self._progress.repeated_steps)
+
+    @property
+    def reached(self) -> float:
+        """End of the last step, s."""
+        return self._reached
+
+    @property
+    def is_at_event(self) -> bool:
+        """Has a component ended the last step at an event?"""
+        return bool(self._at_event)
+
+    @property
+    def event_time(self) -> float:
+        """Time of the last resolved event, s."""
+        return float(self._progress.event_time)
+
+    def double(self) -> Self:
+        """Return an importer of the same components whose steps leave the results of this one as they are."""
+        double = copy(self)
+        double._progress, double.watchers = Progress(), []
+        double.watches = [copy(watch) for watch in self.watches]
+        return double
+
+    def try_step(self, time: float, target: float) -> float:
+        """Make a step that the caller takes back; returns its end, s."""
+        self.make_consistent(time)
+        self._prepare(time)
+        self._settle(time, self._step_all(time, target))
+        return self._reached
+
+    def make_consistent(self, time: float) -> None:
+        """Carry outputs to the inputs of all components that can go back, and solve loops."""
+        if self.loops.names:
+            self._solve_loops(time)
+        else:
+            self._plan.trial_moves()
+
+    # ---- the start of a step ----
+
+    def _solve_loops(self, time: float) -> None:
+        self.loops.solve(time)
+        for transfer in self._plan.looping:
+            transfer.take()
+        self._plan.moves_after_loops()
+        self.loops.hold()
+
+    def _save_start(self) -> None:
+        for component in self._plan.saved:
+            component.instance.save(component.at_start)
+        for watch in self.watches:
+            watch.note_start()
+
+    def take_back(self) -> None:
+        """Go back to the start of the step."""
+        for component in self._plan.saved:
+            component.instance.restore(component.at_start)
