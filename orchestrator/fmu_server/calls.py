@@ -6,6 +6,7 @@ import ctypes
 import math
 from collections.abc import Callable
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
+from functools import partial
 from typing import Any
 
 from google.protobuf.message import DecodeError
@@ -73,13 +74,10 @@ class ServedInstance:
             f"Free{word}": self._free_state,
         }
         if self._is_3:
-            clock = {
-                "GetClock": (c_bool,),
-                "GetIntervalDecimal": (c_double, c_int),
-                "GetShiftDecimal": (c_double,),
-            }
             self._others |= {
-                name: lambda call, kinds=kinds: self._clock(call, *kinds) for name, kinds in clock.items()
+                "GetClock": partial(self._clock, c_bool),
+                "GetIntervalDecimal": partial(self._clock, c_double, c_int),
+                "GetShiftDecimal": partial(self._clock, c_double),
             }
 
     def answer(self, data: bytes) -> tuple[bytes, bool]:
@@ -215,7 +213,8 @@ class ServedInstance:
         places = ((c_uint32 * max(1, count))(*call.references), c_size_t(count))
         return Result(status=self._call(call, *places, ticks))
 
-    def _clock(self, call: Any, *kinds: Any) -> Any:
+    def _clock(self, *kinds_and_call: Any) -> Any:
+        *kinds, call = kinds_and_call
         if len(call.references) != 1:
             raise Refused(f"{call.function}: expected one clock, got {len(call.references)}.")
         results = [kind(math.nan if kind is c_double else 0) for kind in kinds]

@@ -2,9 +2,10 @@
 
 A component with states goes back to the start of the step, is read at each sample, and returns to the end of its step.
 The run is the same, bit for bit, with and without sampling. A component in model exchange is read on the motion of its
-solver, without any repeated step. A component without states, or with one step size, is read at the communication
-points. Between them its real numbers follow straight lines, and all other values are those of the step's start. On a
-grid of its own all its values are held.
+solver, without any repeated step.
+
+A component without states, or with one step size, is read at the communication points. Between them its real numbers
+follow straight lines, and all other values are those of the step's start. On a grid of its own all its values are held.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def _size_problems(draft: GeneralDraft, name: str, facts: ComponentFacts) -> Ite
 def _clock_problems(draft: GeneralDraft, name: str, facts: ComponentFacts) -> Iterator[Problem]:
     """A clock of a component with one step size ticks at the ends of its steps."""
     assert draft.execution is not None
-    steps = draft.swept_steps() or (draft.execution.macro_step,)
+    steps = draft.swept_steps() or (draft.execution.fixed_step,)
     for clock in facts.capabilities.clocks:
         times = (clock.interval, clock.shift)
         for step in steps:
