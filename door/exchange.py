@@ -28,6 +28,7 @@ def export_fmu(
     external: bool = False,
     enumerations: bool = False,
     model_exchange: bool = False,
+    sensitivities: str | None = None,
     platform: str | None = None,
 ) -> Path:
     """Write a scene's body, stops and forcing as one FMU for another tool; `vi.fmus.export` writes one component.
@@ -38,7 +39,7 @@ def export_fmu(
         A scene of one body. A swept key has the value in its own table, not the values of the sweep.
     path : path
         FMU file to write.
-    fmi, full, external, enumerations, model_exchange, platform
+    fmi, full, external, enumerations, model_exchange, sensitivities, platform
         Options of the FMU: see `vibroimpact.fmus.export`.
 
     Returns
@@ -69,6 +70,7 @@ def export_fmu(
         external=external,
         enumerations=enumerations,
         model_exchange=model_exchange,
+        sensitivities=sensitivities,
         platform=platform,
     )
 

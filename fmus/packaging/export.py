@@ -32,6 +32,7 @@ from vibroimpact.fmus.packaging.description import (
 from vibroimpact.fmus.packaging.experiment import default_experiment
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
+from vibroimpact.fmus.packaging.sensitivities import SENSITIVITIES_MEMBER, with_sensitivities
 from vibroimpact.fmus.packaging.structure_file import STRUCTURE_MEMBER, natural_frequencies
 from vibroimpact.fmus.shipped import component_name
 
@@ -63,6 +64,7 @@ def export_fmu(
     external: bool = False,
     enumerations: bool = False,
     model_exchange: bool = False,
+    sensitivities: str | None = None,
     stop_time: float | None = None,
     platform: str | None = None,
     units: Mapping[str, UnitDefinition] | None = None,
@@ -96,6 +98,9 @@ def export_fmu(
     model_exchange : bool
         Whether to describe the states of a Structure, for tools that integrate it. Other bodies always have their
         states.
+    sensitivities : str, optional
+        Parameters, with commas between them, over which outputs have derivatives since the start: further outputs
+        `sensitivity.OUTPUT.KEY`, in co-simulation alone.
     stop_time : float, optional
         Default end of a run, s; without it, a time that suits the body's frequencies.
     platform : str, optional
@@ -152,7 +157,12 @@ def export_fmu(
             )
         component = with_units(component, units or {})
         _refuse_starts_beyond(component, own_starts)
+        pairs = None
+        if sensitivities is not None:
+            component, pairs = with_sensitivities(component, original, sensitivities)
         resources = {} if structure is None else {STRUCTURE_MEMBER: structure}
+        if pairs is not None:
+            resources[SENSITIVITIES_MEMBER] = pairs
         if own_starts:
             resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
         tried = replace(experiment, stop_time=min(experiment.stop_time, suitable.stop_time))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from vibroimpact.fmus.commands.fmu import export_component, export_user_law
 from vibroimpact.fmus.errors import UsageError
@@ -23,6 +24,7 @@ def export_to_file(options: ExportFmu) -> None:
         "external": options.ports == "external",
         "enumerations": options.enumerations,
         "model_exchange": options.model_exchange,
+        "sensitivities": options.sensitivities,
     }
     given = [
         f"--{name.replace('_', '-')}"
@@ -43,7 +45,7 @@ def export_to_file(options: ExportFmu) -> None:
     _export_scene_file(options, kinds)
 
 
-def _export_scene_file(options: ExportFmu, kinds: Mapping[str, bool]) -> None:
+def _export_scene_file(options: ExportFmu, kinds: Mapping[str, Any]) -> None:
     # these libraries take half a second to load, and a component needs none
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
     from vibroimpact.orchestrator.run.export import export_scene

@@ -71,6 +71,14 @@ class ExportFmu(Operation):
             "always have theirs.",
         ),
     ] = False
+    sensitivities: Annotated[
+        str | None,
+        Option(
+            metavar="KEY,...",
+            help="Add the derivatives of outputs over these parameters since the start, through impacts, for example "
+            "stop[1].restitution,forcing.amplitude; for co-simulation alone.",
+        ),
+    ] = None
     platform: Annotated[
         str | None,
         Option(

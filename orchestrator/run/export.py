@@ -24,6 +24,7 @@ def export_scene(
     external: bool = False,
     enumerations: bool = False,
     model_exchange: bool = False,
+    sensitivities: str | None = None,
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
@@ -37,7 +38,7 @@ def export_scene(
         File to write.
     fmi : str
         `3.0` or `2.0`.
-    full, external, enumerations, model_exchange, platform, note
+    full, external, enumerations, model_exchange, sensitivities, platform, note
         See `vibroimpact.fmus.export`.
 
     Returns
@@ -82,6 +83,7 @@ def export_scene(
         external=external,
         enumerations=enumerations,
         model_exchange=model_exchange,
+        sensitivities=sensitivities,
         stop_time=_duration(scene),
         platform=platform,
         note=note,

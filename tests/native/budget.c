@@ -40,7 +40,7 @@ static vi_structure rattling(int modes, double gap)
     }
     state.p[0] = 1.0;
     vi_structure_prepare(&model);
-    const vi_structure s = {&model, &state, contacts, &record, &pressed, &scan, NULL, NULL, {0, NULL, NULL, NULL}};
+    const vi_structure s = {&model, &state, contacts, &record, &pressed, &scan, NULL, NULL, {0, NULL, NULL, NULL}, NULL};
     vi_structure_start(&s, (vi_instant){0, 0.0, 0.0});
     return s;
 }

@@ -35,7 +35,7 @@ typedef struct {
 
 static vi_structure parts(body *b)
 {
-    return (vi_structure){&b->saved.model, &b->saved.state, b->saved.contacts, &b->saved.record, &b->pressed, &b->scan, NULL, NULL, {0, NULL, NULL, NULL}};
+    return (vi_structure){&b->saved.model, &b->saved.state, b->saved.contacts, &b->saved.record, &b->pressed, &b->scan, NULL, NULL, {0, NULL, NULL, NULL}, NULL};
 }
 
 static double displacement(body *b)

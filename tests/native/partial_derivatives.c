@@ -110,7 +110,7 @@ vi_body *vi_body_of(void *self)
 
 vi_structure vi_body_parts(vi_body *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, NULL, NULL, NULL, NULL, {0, NULL, NULL, NULL}};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, NULL, NULL, NULL, NULL, {0, NULL, NULL, NULL}, NULL};
 }
 
 void vi_body_refresh_inputs(void *self)

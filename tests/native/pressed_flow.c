@@ -26,7 +26,7 @@ static double held[VI_MODES];
 
 static vi_structure body_of(parts *it, vi_pressed_cache *kept)
 {
-    return (vi_structure){&it->model, &it->state, it->contacts, &it->record, kept, NULL, NULL, NULL, {0, NULL, NULL, NULL}};
+    return (vi_structure){&it->model, &it->state, it->contacts, &it->record, kept, NULL, NULL, NULL, {0, NULL, NULL, NULL}, NULL};
 }
 
 /* Make the cache a new one. */

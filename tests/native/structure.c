@@ -32,7 +32,7 @@ static vi_pressed_cache pressed;
 static vi_scan scan;
 static vi_power_tables power;
 static vi_signal_loads loads;
-static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power, &loads, {0, NULL, NULL, NULL}};
+static const vi_structure body = {&model, &state, contacts, &record, &pressed, &scan, &power, &loads, {0, NULL, NULL, NULL}, NULL};
 
 #if VI_SIGNALS > 0
 

@@ -13,12 +13,13 @@
 #include <stdint.h>
 
 #include "body/complaint.h"
+#include "body/modal/variation.h"
 #include "body/step.h"
-#include "variation.h"
 
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
 
-enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3, VI_SET_STATE = 4 };
+/* VI_SENSITIVITY: a derivative since the start, which is no variable of the table and is read only. */
+enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3, VI_SET_STATE = 4, VI_SENSITIVITY = 5 };
 
 /* One variable; its value reference is its index in the table. */
 typedef struct {
@@ -86,6 +87,13 @@ typedef struct {
 
 enum { VI_MOST_ORDER = 2 }; /* of an output's derivative over time */
 
+/* An output, and a parameter over which its derivative since the start is an output of its own: value references. */
+typedef struct {
+    uint32_t unknown, known;
+} vi_derivative_pair;
+
+enum { VI_MOST_SENSITIVITIES = 512 }; /* most pairs of one instance */
+
 /* A component. All functions work on the flat struct `self` and allocate nothing; `message` is empty on entry. */
 typedef struct {
     /* Fill `self` (zeroed up to its caches) with the default values. */
@@ -130,6 +138,12 @@ typedef struct {
 
     /* NULL for a component that gives no derivatives. */
     const vi_partial_derivatives *partial;
+
+    /* Follow the derivatives of these outputs over these parameters from the start on; called after `defaults`. False,
+     * with the reason in `message`, for another pair. Their values are an array of doubles at the offset `followed`.
+     * Both are NULL for a component that has none. */
+    bool (*follow)(void *self, const vi_derivative_pair pairs[], size_t count, char message[VI_MESSAGE_LENGTH]);
+    size_t (*followed)(void);
 } vi_component;
 
 /* The only component in this shared library. */

@@ -31,23 +31,6 @@ static void add(const vi_line *line, double factor, vi_variation *change)
     change->contact[line->port] += factor * line->force;
 }
 
-/* Sum of a shape times a part of the change; a factor of 0 leaves out what may be infinite. */
-static double product(const vi_line *line, double factor, const double part[])
-{
-    double sum = 0.0;
-    for (int i = 0; i < line->count && factor != 0.0; ++i) {
-        sum += line->shape[i] * part[line->first + i];
-    }
-    return factor * sum;
-}
-
-static double read(const vi_line *line, const vi_variation *change)
-{
-    return product(line, line->displacement, change->displacement) + product(line, line->velocity, change->velocity)
-           + product(line, line->load, change->load) + line->base * change->base
-           + line->force * change->contact[line->port];
-}
-
 /* ---- variables ---- */
 
 /* Find the line of a variable. A state is a known only where it is no result of the start. */
@@ -57,6 +40,10 @@ static bool find_line(vi_instance *instance, const char *function, const end_of_
     const vi_variable *variable = vi_instance_find(instance, function, VI_FLOAT64, reference);
     if (variable == NULL) {
         return false;
+    }
+    if (variable->access == VI_SENSITIVITY) {
+        return vi_instance_fail(instance, function, "value reference %lu is no %s here", (unsigned long)reference,
+                                end->kind);
     }
     const bool fixed = end->line == vi_this_component.partial->column && variable->access == VI_SET_STATE
                        && instance->mode == VI_MODE_INITIALIZATION;
@@ -143,7 +130,7 @@ vi_status vi_instance_derive(vi_instance *instance, const char *function, const 
         if (!find_line(instance, function, to, to->references[i], &line)) {
             return VI_ERROR;
         }
-        call->sensitivity[i] = read(&line, &change);
+        call->sensitivity[i] = vi_line_read(&line, &change);
     }
     return is_finite(instance, function, call->sensitivity, call->sensitivity_count) ? VI_OK : VI_DISCARD;
 }
@@ -151,7 +138,7 @@ vi_status vi_instance_derive(vi_instance *instance, const char *function, const 
 /* ---- over time ---- */
 
 /* Find the carried changes up to an order, `known` of which are; false after logging. */
-static bool find_rates(vi_instance *instance, const char *function, int order, vi_variation rate[], int *known)
+VI_RARE static bool find_rates(vi_instance *instance, const char *function, int order, vi_variation rate[], int *known)
 {
     const vi_partial_derivatives *partial = vi_this_component.partial;
     for (; *known < order; ++*known) {
@@ -168,7 +155,7 @@ static bool find_rates(vi_instance *instance, const char *function, int order, v
     return true;
 }
 
-vi_status vi_instance_differentiate(vi_instance *instance, const char *function, const uint32_t references[],
+VI_RARE vi_status vi_instance_differentiate(vi_instance *instance, const char *function, const uint32_t references[],
                                     const int32_t orders[], double values[], size_t count)
 {
     const vi_partial_derivatives *partial = vi_this_component.partial;
@@ -203,7 +190,7 @@ vi_status vi_instance_differentiate(vi_instance *instance, const char *function,
         }
         const vi_variable *variable = vi_instance_find(instance, function, VI_FLOAT64, references[i]);
         const uint32_t own = (uint32_t)(variable - vi_this_description.variables);
-        values[i] = read(&line, &rate[order - 1]);
+        values[i] = vi_line_read(&line, &rate[order - 1]);
         values[i] += order == 2 && partial->bend != NULL ? partial->bend(instance->self, own) : 0.0;
     }
     return is_finite(instance, function, values, count) ? VI_OK : VI_DISCARD;

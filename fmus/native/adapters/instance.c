@@ -62,6 +62,8 @@ void vi_instance_free(vi_instance *instance)
         free(instance->name);
         free(instance->starts);
         free(instance->references);
+        free(instance->pairs);
+        free(instance->slots);
         free(instance);
     }
 }
@@ -105,6 +107,9 @@ void vi_instance_reset(vi_instance *instance)
     if (instance->exchange) {
         vi_instance_exchange(instance);
     }
+    if (instance->pair_count > 0) { /* they were taken once, in describe */
+        (void)component->follow(instance->self, instance->pairs, instance->pair_count, instance->message);
+    }
     for (size_t i = 0; i < instance->start_count; ++i) {
         put_start(instance, &instance->starts[i]);
     }
@@ -147,14 +152,46 @@ void vi_instance_warn(const vi_instance *instance, const char *function, const c
 
 static bool number(vi_instance *instance, const char *function, const char *folder)
 {
-    instance->references = calloc(description->variable_count, sizeof *instance->references);
+    const size_t most = description->variable_count + VI_MOST_SENSITIVITIES;
+    instance->references = calloc(most, sizeof *instance->references);
     if (instance->references == NULL) {
         return vi_instance_fail(instance, function, "out of memory");
     }
-    instance->reference_count = vi_references_read(folder, instance->references, description->variable_count);
+    instance->reference_count = vi_references_read(folder, instance->references, most);
     return instance->reference_count > 0
            || vi_instance_fail(instance, function, "expected the FMU's folder of resources with references.txt, got %s",
                                folder != NULL ? folder : "none");
+}
+
+/* Read the pairs whose derivatives are followed, and make a variable of each. */
+VI_RARE static bool follow(vi_instance *instance, const char *function, const char *folder)
+{
+    vi_derivative_pair first;
+    if (component->follow == NULL || vi_pairs_read(folder, &first, 1) == 0) {
+        return true;
+    }
+    instance->pairs = calloc(VI_MOST_SENSITIVITIES, sizeof *instance->pairs);
+    instance->slots = calloc(VI_MOST_SENSITIVITIES, sizeof *instance->slots);
+    if (instance->pairs == NULL || instance->slots == NULL) {
+        return vi_instance_fail(instance, function, "out of memory");
+    }
+    const size_t count = vi_pairs_read(folder, instance->pairs, VI_MOST_SENSITIVITIES);
+    for (size_t i = 0; i < count; ++i) {
+        const vi_derivative_pair *pair = &instance->pairs[i];
+        if (pair->unknown >= description->variable_count || pair->known >= description->variable_count) {
+            return vi_instance_fail(instance, function, "sensitivities.txt: expected value references below %lu, got %lu"
+                                    " and %lu", (unsigned long)description->variable_count,
+                                    (unsigned long)pair->unknown, (unsigned long)pair->known);
+        }
+        instance->slots[i] = (vi_variable){VI_FLOAT64, VI_SENSITIVITY, 1,
+                                           (uint32_t)(component->followed() + i * sizeof(double))};
+    }
+    instance->message[0] = '\0';
+    if (!component->follow(instance->self, instance->pairs, count, instance->message)) {
+        return vi_instance_fail(instance, function, "%s", instance->message);
+    }
+    instance->pair_count = count;
+    return true;
 }
 
 bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder, bool numbered)
@@ -174,6 +211,9 @@ bool vi_instance_describe(vi_instance *instance, const char *function, const cha
         if (instance->resources == NULL) {
             return vi_instance_fail(instance, function, "%s", instance->message);
         }
+    }
+    if (!follow(instance, function, folder)) {
+        return false;
     }
     vi_instance_reset(instance);
     return true;
@@ -273,7 +313,11 @@ const vi_variable *vi_instance_find(vi_instance *instance, const char *function,
     size_t own = reference;
     if (instance->references != NULL) {
         const bool described = reference >= 1 && reference <= instance->reference_count;
-        own = described ? instance->references[reference - 1] : description->variable_count;
+        own = described ? instance->references[reference - 1] : SIZE_MAX;
+    }
+    if (own >= description->variable_count && own - description->variable_count < instance->pair_count
+        && type == VI_FLOAT64) {
+        return &instance->slots[own - description->variable_count];
     }
     if (own >= description->variable_count || description->variables[own].type != type) {
         vi_instance_fail(instance, function, "value reference %lu is not a variable of this type",
@@ -335,7 +379,7 @@ static bool may_set(vi_instance *instance, const char *function, const vi_variab
     if (variable->access == VI_SET_STATE && may_set_states(instance)) {
         return true;
     }
-    if (variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE) {
+    if (variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE || variable->access == VI_SENSITIVITY) {
         return vi_instance_fail(instance, function, "value reference %lu cannot be set", (unsigned long)reference);
     }
     const int modes = variable->access == VI_SET_INITIAL ? VI_BEFORE_START : VI_BEFORE_START | VI_RUNNING;

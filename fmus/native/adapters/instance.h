@@ -46,6 +46,9 @@ struct vi_instance {
     size_t start_count;
     uint32_t *references;    /* the component's references for 1, 2, ... of the description; NULL: the same */
     size_t reference_count;
+    vi_derivative_pair *pairs;          /* of outputs and parameters, whose derivatives are further variables; NULL: there are none */
+    vi_variable *slots;      /* these variables */
+    size_t pair_count;
     void *resources;         /* resources opened by the component; NULL for most components */
 };
 

@@ -71,6 +71,20 @@ size_t vi_references_read(const char *folder, uint32_t references[], size_t most
     return count;
 }
 
+VI_RARE size_t vi_pairs_read(const char *folder, vi_derivative_pair pairs[], size_t most)
+{
+    FILE *file = vi_resource_open(folder, "sensitivities.txt");
+    if (file == NULL) {
+        return 0;
+    }
+    size_t count = 0;
+    while (count < most && fscanf(file, "%9" SCNu32 " %9" SCNu32, &pairs[count].unknown, &pairs[count].known) == 2) {
+        count += 1;
+    }
+    (void)fclose(file);
+    return count;
+}
+
 static bool hexadecimal(char c)
 {
     return c != '\0' && strchr("0123456789abcdefABCDEF", c) != NULL;

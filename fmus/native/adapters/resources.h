@@ -7,6 +7,9 @@
  *
  * references.txt (FMI 3.0): the component's value references of the variables of the description. The description
  * numbers its variables from 1 on in their order, as OMSimulator takes the references in dependencies for places.
+ *
+ * sensitivities.txt: pairs of an output and a parameter, as the component's value references, such as `30 7`. The
+ * derivative of pair i is the variable with the number of the component's variables + i as the component's reference.
  */
 #ifndef VIBROIMPACT_RESOURCES_H
 #define VIBROIMPACT_RESOURCES_H
@@ -15,6 +18,8 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+
+#include "component.h"
 
 enum { VI_MOST_SIZES = 8, VI_BLOCK_LENGTH = 16, VI_PATH_LENGTH = 4096 }; /* most sizes; longest texts */
 
@@ -40,6 +45,9 @@ size_t vi_starts_read(const char *folder, vi_start starts[], size_t most);
 
 /* Read at most `most` value references of the component, and return their number; 0 without folder or file. */
 size_t vi_references_read(const char *folder, uint32_t references[], size_t most);
+
+/* Read at most `most` pairs, and return their number; 0 without folder or file. */
+size_t vi_pairs_read(const char *folder, vi_derivative_pair pairs[], size_t most);
 
 /* Open a file of the folder of resources for reading bytes; NULL when the folder is NULL or lacks the file. */
 FILE *vi_resource_open(const char *folder, const char *name);

@@ -422,6 +422,25 @@ static bool row(void *self, size_t offset, vi_line *line)
     return vi_body_line_of_mode(&b->body, line, j, 1.0 / b->root_mass);
 }
 
+/* ---- derivatives since the start ---- */
+
+VI_RARE static bool parameter(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of)
+{
+    const beam *b = self;
+    int j;
+    if (vi_body_is_element(offset, offsetof(beam, modal_displacement_start), sizeof b->modal_displacement_start, &j)) {
+        of->q[j] = j < b->modes ? b->root_mass : 0.0;
+    } else if (vi_body_is_element(offset, offsetof(beam, modal_velocity_start), sizeof b->modal_velocity_start, &j)) {
+        of->p[j] = j < b->modes ? b->root_mass : 0.0;
+    } else if (vi_body_is_element(offset, offsetof(beam, damping_ratio), sizeof b->damping_ratio, &j)) {
+        parameter->row[j] = j < b->modes ? 1.0 : 0.0;
+        parameter->damping = 2.0 * b->body.natural[j];
+    } else {
+        return offset == offsetof(beam, forcing_amplitude) && vi_body_forcing_slopes(self, offset, parameter);
+    }
+    return true;
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(beam, body),
     .restitution = BEAM_CONTACT_APPLIED_RESTITUTION_1,
@@ -442,4 +461,5 @@ const vi_body_form vi_this_body = {
     .show_states = show_states,
     .column = column,
     .row = row,
+    .parameter = parameter,
 };

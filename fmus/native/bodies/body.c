@@ -34,9 +34,16 @@ vi_structure vi_body_parts(vi_body *c)
         form->make_signals((char *)c - form->place, &c->signals);
         c->signals.key = c->signals_key;
     }
+    const bool follows = c->sensitive.count > 0;
+    if (follows) {
+        c->sensitive.base_held = c->base_acceleration;
+        c->sensitive.base_rate = c->base_acceleration_rate;
+        c->sensitive.base_amplitude = form->base_forcing((const char *)c - form->place);
+        c->sensitive.base_since = c->state.input_since;
+    }
     const vi_table tables = form->tables != NULL ? form->tables((const char *)c - form->place) : (vi_table){0, NULL, NULL, NULL};
     return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed, &c->scan, &c->power,
-                          any_signals ? &c->signals : NULL, tables};
+                          any_signals ? &c->signals : NULL, tables, follows ? &c->sensitive : NULL};
 }
 
 static void defaults(void *self)
@@ -129,6 +136,9 @@ static void drive(void *self, vi_body *c)
     }
     if (good) {
         const vi_structure parts = vi_body_parts(c);
+        if (c->forcing_angular_frequency != c->model.clock.angular_frequency) {
+            vi_body_retune_sensitivities(self);
+        }
         vi_structure_drive(&parts, force, c->forcing_angular_frequency);
         vi_stop_motions_count_by(&c->model);
         if (form->drive_further != NULL) {
@@ -238,6 +248,9 @@ static void update_outputs(void *self)
     if (c->state.exchange.on) {
         vi_body_show_indicators(self);
     }
+    if (parts.sensitive != NULL) {
+        vi_body_show_sensitivities(self);
+    }
 }
 
 /* ---- start ---- */
@@ -302,8 +315,10 @@ static bool start(void *self, vi_body *c, double start_time, char *message)
     if (form->drive_further != NULL) {
         form->drive_further(self, true);
     }
+    vi_body_clear_sensitivities(self);
     vi_structure_start(&parts, now);
-    return true;
+    vi_body_start_sensitivities(self, message);
+    return message[0] == '\0';
 }
 
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
@@ -421,10 +436,13 @@ static bool needs_events(const void *self)
 /* Bytes of `pressed`, `scan`, `power` and `signals`, the last members. */
 enum { CACHES = sizeof(vi_pressed_cache) + sizeof(vi_scan) + sizeof(vi_power_tables) + sizeof(vi_signal_loads) };
 
-/* Caches and unused rows of the record are not saved. */
+/* Caches, unused rows of the record and derivatives that no one follows are not saved. */
 static size_t used_size(const void *self)
 {
-    return vi_this_description.struct_size - (vi_record_unused(&const_body_of(self)->record) + CACHES);
+    const vi_body *c = const_body_of(self);
+    const size_t followed = sizeof c->sensitive + sizeof c->followed;
+    return vi_this_description.struct_size - CACHES
+           - (c->sensitive.count > 0 ? 0 : vi_record_unused(&c->record) + followed);
 }
 
 const vi_component vi_this_component = {
@@ -445,4 +463,6 @@ const vi_component vi_this_component = {
     .close = close_resources,
     .exchange = &vi_body_exchange,
     .partial = &vi_body_derivatives,
+    .follow = vi_body_follow,
+    .followed = vi_body_followed,
 };

@@ -14,6 +14,7 @@
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure/exchange.h"
 #include "body/modal/structure/structure.h"
+#include "body_sensitivities.h"
 #include "component.h"
 
 typedef struct {
@@ -37,7 +38,9 @@ typedef struct {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     uint64_t signals_key; /* hash of the signals' parameters, 0: there are none */
-    vi_record record;   /* saved only as far as it is used; the members after it are not saved */
+    vi_record record;   /* saved only as far as it is used */
+    vi_sensitivities sensitive; /* `sensitive` and `followed` are saved only where there are any */
+    vi_followed followed;
     vi_pressed_cache pressed; /* `pressed`, `scan`, `power` and `signals` are caches */
     vi_scan scan;
     vi_power_tables power;
@@ -93,6 +96,9 @@ typedef struct {
      * zeroed. False: it is none. The base's acceleration is a known of the component for its loads alone. */
     bool (*column)(void *self, size_t offset, vi_line *line);
     bool (*row)(void *self, size_t offset, vi_line *line);
+    /* How the equations, and the start in `of`, depend on a parameter of the component's own at this offset; both are
+     * zeroed. False: the component has no derivative over it. */
+    bool (*parameter)(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of);
 } vi_body_form;
 
 /* The body of the only component in this shared library. */

@@ -9,14 +9,14 @@
 static const vi_body_form *const form = &vi_this_body;
 
 /* The derivative of a cosine of the phase. */
-static double turned(vi_phase phase, double angular_frequency, int order)
+VI_RARE static double turned(vi_phase phase, double angular_frequency, int order)
 {
     return order == 1 ? -angular_frequency * phase.sine : -angular_frequency * angular_frequency * phase.cosine;
 }
 
 /* ---- loads ---- */
 
-static double load_of_mode(const vi_structure *s, int j, int order)
+VI_RARE static double load_of_mode(const vi_structure *s, int j, int order)
 {
     const vi_mode *mode = &s->model->mode[j];
     const vi_phase *further = vi_structure_further(s);
@@ -32,7 +32,7 @@ static double load_of_mode(const vi_structure *s, int j, int order)
 }
 
 /* The base's acceleration by further sines and signals of these values. */
-static double base_further(const vi_body *c, const vi_phase phases[], double signal)
+VI_RARE static double base_further(const vi_body *c, const vi_phase phases[], double signal)
 {
     double values[VI_SIGNALS_ROOM];
     for (int k = 0; k < VI_SIGNALS_ROOM; ++k) {
@@ -41,7 +41,7 @@ static double base_further(const vi_body *c, const vi_phase phases[], double sig
     return form->base_further((const char *)c - form->place, phases, values);
 }
 
-static const char *rate_of_base(const vi_structure *s, const vi_body *c, int order, double *rate)
+VI_RARE static const char *rate_of_base(const vi_structure *s, const vi_body *c, int order, double *rate)
 {
     const double amplitude = form->base_forcing((const char *)c - form->place);
     const vi_phase none[VI_SINES_ROOM] = {{0.0, 0.0, 0.0}}, *further = vi_structure_further(s);
@@ -63,7 +63,7 @@ static const char *rate_of_base(const vi_structure *s, const vi_body *c, int ord
 
 /* What the forces of a pressed contact gain by the motion of its stop and, at order 2, by the bend of a power law. `first`
  * is the change of order 1. */
-static double force_of_contact(const vi_structure *s, int k, int order, const vi_variation *first)
+VI_RARE static double force_of_contact(const vi_structure *s, int k, int order, const vi_variation *first)
 {
     const double sign = vi_structure_direction(s, k), depth = -vi_structure_clearance(s, k);
     const vi_contact_force slopes = vi_structure_yield(s, k);
@@ -84,7 +84,7 @@ static double force_of_contact(const vi_structure *s, int k, int order, const vi
 }
 
 /* Are the equations of a contact those of one at rest on a stop that moves? */
-static bool rests_on_moving_stop(const vi_structure *s)
+VI_RARE static bool rests_on_moving_stop(const vi_structure *s)
 {
     bool rests = false;
     for (int k = 0; k < s->model->contacts && vi_structure_stops_move(s->model); ++k) {
@@ -95,7 +95,7 @@ static bool rests_on_moving_stop(const vi_structure *s)
     return rests;
 }
 
-const char *vi_body_rate(void *self, int order, const vi_variation *first, vi_variation *change)
+VI_RARE const char *vi_body_rate(void *self, int order, const vi_variation *first, vi_variation *change)
 {
     const vi_body *c = vi_body_of(self);
     const vi_structure s = vi_body_parts(vi_body_of(self));
@@ -117,7 +117,7 @@ const char *vi_body_rate(void *self, int order, const vi_variation *first, vi_va
     return rate_of_base(&s, c, order, &change->base);
 }
 
-double vi_body_bend(void *self, uint32_t reference)
+VI_RARE double vi_body_bend(void *self, uint32_t reference)
 {
     const vi_body *c = vi_body_of(self);
     const vi_structure s = vi_body_parts(vi_body_of(self));

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "variation.h"
+#include "body/modal/variation.h"
 
 /* Set a zeroed change to the derivatives of this order, 1 or 2, before it is carried; `first` is the carried change of
  * order 1. Returns NULL, or what has no such derivative. */

@@ -293,6 +293,60 @@ static bool row(void *self, size_t offset, vi_line *line)
     return true;
 }
 
+/* ---- derivatives since the start ---- */
+
+/* Set the row of a mass, or of the way between mass i and the one before; the ground is before the first. */
+VI_RARE static void row_of(const chain *c, int i, bool between, double row[])
+{
+    for (int j = 0; j < modes_of(c) && i < c->masses; ++j) {
+        row[j] = c->shape[i][j] - (between && i > 0 ? c->shape[i - 1][j] : 0.0);
+    }
+}
+
+/* A mass, spring or dashpot. The modes are those of the parameters now, and have to be all. */
+VI_RARE static bool parameter_of_matrices(const chain *c, size_t offset, vi_parameter *parameter)
+{
+    const int last = (int)c->masses - 1;
+    int i;
+    if (vi_body_is_element(offset, offsetof(chain, parameter.mass), sizeof c->parameter.mass, &i)) {
+        parameter->mass = 1.0;
+        row_of(c, i, false, parameter->row);
+    } else if (vi_body_is_element(offset, offsetof(chain, parameter.stiffness), sizeof c->parameter.stiffness, &i)) {
+        parameter->stiffness = 1.0;
+        row_of(c, i, true, parameter->row);
+    } else if (vi_body_is_element(offset, offsetof(chain, parameter.damping), sizeof c->parameter.damping, &i)) {
+        parameter->damping = 1.0;
+        row_of(c, i, true, parameter->row);
+    } else if (offset == offsetof(chain, far_stiffness) || offset == offsetof(chain, far_damping)) {
+        parameter->stiffness = offset == offsetof(chain, far_stiffness) ? 1.0 : 0.0;
+        parameter->damping = 1.0 - parameter->stiffness;
+        row_of(c, last, false, parameter->row);
+    } else {
+        return false;
+    }
+    return modes_of(c) >= c->masses;
+}
+
+VI_RARE static bool parameter(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of)
+{
+    const chain *c = self;
+    double load[VI_MODES] = {0.0};
+    int i;
+    if (vi_body_is_element(offset, offsetof(chain, displacement_start), sizeof c->displacement_start, &i)) {
+        load[i] = c->parameter.mass[i];
+        project(c, load, of->q);
+    } else if (vi_body_is_element(offset, offsetof(chain, velocity_start), sizeof c->velocity_start, &i)) {
+        load[i] = c->parameter.mass[i];
+        project(c, load, of->p);
+    } else if (vi_body_is_element(offset, offsetof(chain, forcing_amplitude), sizeof c->forcing_amplitude, &i)
+               || offset == offsetof(chain, forcing_base_acceleration)) {
+        return vi_body_forcing_slopes(self, offset, parameter);
+    } else {
+        return parameter_of_matrices(c, offset, parameter);
+    }
+    return true;
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(chain, body),
     .restitution = CHAIN_CONTACT_APPLIED_RESTITUTION_1,
@@ -311,4 +365,5 @@ const vi_body_form vi_this_body = {
     .show_states = show_states,
     .column = column,
     .row = row,
+    .parameter = parameter,
 };

@@ -27,6 +27,13 @@
 #define VI_DEGREE 1 /* degree of the polynomials in time that inputs are on a segment, >= 1 */
 #endif
 
+/* A function that few instances call: compilers keep it small. */
+#if defined(__GNUC__) || defined(__clang__)
+#define VI_RARE __attribute__((cold))
+#else
+#define VI_RARE
+#endif
+
 /* Rooms of arrays that may be unused: C has no empty arrays. */
 enum {
     VI_SINES_ROOM = VI_SINES > 0 ? VI_SINES : 1,

@@ -171,6 +171,25 @@ static bool row(void *self, size_t offset, vi_line *line)
     return true;
 }
 
+/* ---- derivatives since the start ---- */
+
+VI_RARE static bool parameter(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of)
+{
+    const oscillator *o = self;
+    const double root = sqrt(o->mass);
+    parameter->row[0] = 1.0 / root;
+    switch (offset) {
+    case offsetof(oscillator, mass): parameter->mass = 1.0; return true;
+    case offsetof(oscillator, damping): parameter->damping = 1.0; return true;
+    case offsetof(oscillator, stiffness): parameter->stiffness = 1.0; return true;
+    case offsetof(oscillator, displacement_start): of->q[0] = root; return true;
+    case offsetof(oscillator, velocity_start): of->p[0] = root; return true;
+    case offsetof(oscillator, forcing_amplitude):
+    case offsetof(oscillator, forcing_base_acceleration): return vi_body_forcing_slopes(self, offset, parameter);
+    default: return false;
+    }
+}
+
 const vi_body_form vi_this_body = {
     .place = offsetof(oscillator, body),
     .restitution = OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1,
@@ -189,4 +208,5 @@ const vi_body_form vi_this_body = {
     .show_states = show_states,
     .column = column,
     .row = row,
+    .parameter = parameter,
 };

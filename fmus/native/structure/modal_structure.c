@@ -491,4 +491,5 @@ const vi_body_form vi_this_body = {
     .show_states = show_states,
     .column = vi_structure_column,
     .row = vi_structure_row,
+    .parameter = vi_structure_parameter,
 };

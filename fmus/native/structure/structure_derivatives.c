@@ -74,3 +74,11 @@ bool vi_structure_row(void *self, size_t offset, vi_line *line)
     }
     return vi_body_line_of_mode(&s->body, line, j, 1.0);
 }
+
+VI_RARE bool vi_structure_parameter(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of)
+{
+    (void)of;
+    return (offset == offsetof(modal_structure, forcing_amplitude)
+            || offset == offsetof(modal_structure, forcing_base_acceleration))
+           && vi_body_forcing_slopes(self, offset, parameter);
+}

@@ -5,7 +5,7 @@ from the FMU's directional derivative, or from differences of two sizes. They mu
 limit, so the derivatives must be linear in it. Trials give the effective mass, J over the change of the velocity.
 
 A body without a force input has a velocity that is a continuous state, or equals one. An impact sets that state.
-docs/equations.md 6.17 has the rules.
+docs/equations.md 6.18 has the rules.
 """
 
 from __future__ import annotations

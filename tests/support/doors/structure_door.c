@@ -24,7 +24,7 @@ struct vi_door_structure {
 static vi_structure parts(vi_door_structure *d)
 {
     return (vi_structure){&d->model, &d->state, d->contacts, &d->record, d->by_series ? NULL : &d->pressed,
-                          &d->scan, d->by_series ? NULL : &d->power, NULL, {0, NULL, NULL, NULL}};
+                          &d->scan, d->by_series ? NULL : &d->power, NULL, {0, NULL, NULL, NULL}, NULL};
 }
 
 static void set_stop(vi_contact *contact, const vi_door_stop *stop)

@@ -20,7 +20,7 @@ typedef struct {
 
 static vi_structure parts_of(body *b)
 {
-    return (vi_structure){&b->model, &b->state, &b->contact, &b->record, NULL, b->scan, NULL, NULL, {0, NULL, NULL, NULL}};
+    return (vi_structure){&b->model, &b->state, &b->contact, &b->record, NULL, b->scan, NULL, NULL, {0, NULL, NULL, NULL}, NULL};
 }
 
 static bool start(body *b, const vi_door_oscillator *o, double phase, const double state[2], const vi_contact *contact)

@@ -186,6 +186,9 @@ typedef struct vi_power_tables vi_power_tables;
 /* Loads that are signals of time: loads.h. */
 typedef struct vi_signal_loads vi_signal_loads;
 
+/* Derivatives of the motion over parameters: structure/parameter.h. */
+typedef struct vi_sensitivities vi_sensitivities;
+
 /* Pointers to the parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
@@ -198,6 +201,7 @@ typedef struct {
     vi_power_tables *power; /* NULL: contacts with a power law are followed by series only */
     vi_signal_loads *loads; /* NULL: there are none */
     vi_table tables;        /* of the motions of stops, behind each other */
+    vi_sensitivities *sensitive; /* NULL: there are none */
 } vi_structure;
 
 /* Set mode j: natural angular frequency (rad/s; negative: the stiffness is minus its square), damping ratio and modal

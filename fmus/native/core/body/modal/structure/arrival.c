@@ -2,6 +2,7 @@
 
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body/modal/structure/sensitivity.h"
 
 bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
 {
@@ -40,6 +41,9 @@ void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
 void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
 {
     int hit[VI_PORTS];
+    if (s->sensitive != NULL) {
+        vi_sensitivity_meet(s, k);
+    }
     vi_structure_put_on_stop(s, k);
     for (int l = 0; l < s->model->contacts; ++l) {
         hit[l] = l == k;

@@ -7,6 +7,7 @@
 #include "body/landing.h"
 #include "body/modal/forces.h"
 #include "body/modal/held.h"
+#include "body/modal/structure/sensitivity.h"
 #include "motion/majorant.h"
 
 /* Clearance, in roundings of the displacement, below which contacts meet at the same instant. */
@@ -105,6 +106,9 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     contact->last_phase = s->state->touch_down[k].phase;
     contact->last_velocity = approach;
     contact->impulse = 0.0;
+    if (s->sensitive != NULL) {
+        vi_sensitivity_count(s, k, true);
+    }
 }
 
 /* A number with the sign of a compliant contact's force, whether the contact is pressed or not. */

@@ -13,6 +13,7 @@
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impulses.h"
 #include "body/modal/structure/resolution.h"
+#include "body/modal/structure/sensitivity.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
@@ -68,6 +69,9 @@ static void balance(const vi_structure *s, double before, const double impulse[]
 static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
 {
     const double before = s->state->follow_energies ? vi_structure_kinetic(s) : 0.0;
+    if (s->sensitive != NULL) {
+        vi_sensitivity_rest(s, k, view->impulse);
+    }
     memcpy(s->state->p, view->p, sizeof view->p);
     balance(s, before, view->impulse);
     vi_structure_rest(s, k, delay, tail_impulse);
@@ -150,6 +154,9 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
         s->contacts[k].graze_count += 1;
     } else {
         vi_contact_hit(&s->contacts[k], s->record, &s->model->clock, state->now, k + 1, approach, impulse, restitution);
+        if (s->sensitive != NULL) {
+            vi_sensitivity_count(s, k, false);
+        }
     }
     state->status[k] = VI_CONTACT_TOUCHING;
     state->leaving[k] = rebound == 0.0 ? 1 : 0;
@@ -266,6 +273,9 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     }
     find_in_play(s, hit, in_play);
     vi_structure_joint_impulses(s, in_play, change, impulse, impulse_low);
+    if (s->sensitive != NULL) {
+        vi_sensitivity_impact(s, hit, in_play, approach, impulse);
+    }
     vi_structure_give_impulses(s, impulse, impulse_low);
     balance(s, before, impulse);
     for (int k = 0; k < n; ++k) {
@@ -290,6 +300,9 @@ static void stop_contacts(const vi_structure *s, const int chosen[])
     }
     vi_structure_signed(s, s->model->compliance, g);
     vi_solve_active(s->model->contacts, g, approach, chosen, impulse);
+    if (s->sensitive != NULL) {
+        vi_sensitivity_stop(s, chosen, impulse);
+    }
     for (int k = 0; k < s->model->contacts; ++k) {
         vi_structure_push(s, k, impulse[k], s->state->p);
         s->contacts[k].total_impulse += impulse[k];

@@ -8,6 +8,7 @@
 #include "body/modal/structure/arrival.h"
 #include "body/modal/structure/contact.h"
 #include "body/modal/structure/impact.h"
+#include "body/modal/structure/sensitivity.h"
 #include "contact/complementarity.h"
 
 /* Force, in roundings, up to which a contact whose point others hold counts as without force. */
@@ -84,6 +85,9 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     if (presses && compliant) {
         vi_structure_touch_down(s, k);
     } else if (presses && !was_held) {
+        if (s->sensitive != NULL) {
+            vi_sensitivity_rest(s, k, NULL);
+        }
         vi_structure_rest(s, k, 0.0, 0.0);
     } else if (!presses && was_held) {
         vi_structure_release(s, k, 1);

@@ -17,6 +17,7 @@
 #include "body/modal/structure/jam.h"
 #include "body/modal/structure/random_flight.h"
 #include "body/modal/structure/search.h"
+#include "body/modal/structure/sensitivity.h"
 #include "body/modal/structure/settle.h"
 #include "body/modal/structure/unbounded.h"
 #include "motion/majorant.h"
@@ -80,6 +81,9 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
 {
     vi_structure_state *state = s->state;
     state->moved |= u > 0.0;
+    if (s->sensitive != NULL) {
+        vi_sensitivity_flow(s, u);
+    }
     const vi_instant after = end == VI_ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
         if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]
@@ -413,6 +417,9 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
         return looked;
     }
     const bool coupled = is_coupled(s);
+    if (s->sensitive != NULL) {
+        vi_sensitivity_begin(s);
+    }
     if (state->cascade.rounds > 0) {
         vi_structure_settle(s, stops_here(s, target, request)); /* impacts of this instant go on */
         return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
@@ -445,6 +452,9 @@ vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, co
            && vi_clock_is_before(s->state->now, target)) {
         const bool is_full = request->early_return && vi_record_ends_step(s->record);
         result = is_full ? VI_STEP_RECORD_FULL : move_on(s, target, request);
+    }
+    if (s->sensitive != NULL) {
+        vi_sensitivity_end(s);
     }
     return vi_budget_end(&s->state->budget, result == VI_STEP_DONE && s->state->pending ? VI_STEP_CONTACT : result);
 }

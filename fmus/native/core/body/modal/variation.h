@@ -27,4 +27,22 @@ typedef struct {
     double own[VI_MODES]; /* room for a shape that is nowhere else */
 } vi_line;
 
+/* Sum of a shape times a part of the change; a factor of 0 leaves out what may be infinite. */
+static inline double vi_line_product(const vi_line *line, double factor, const double part[])
+{
+    double sum = 0.0;
+    for (int i = 0; i < line->count && factor != 0.0; ++i) {
+        sum += line->shape[i] * part[line->first + i];
+    }
+    return factor * sum;
+}
+
+/* The change of the variable. */
+static inline double vi_line_read(const vi_line *line, const vi_variation *change)
+{
+    return vi_line_product(line, line->displacement, change->displacement)
+           + vi_line_product(line, line->velocity, change->velocity) + vi_line_product(line, line->load, change->load)
+           + line->base * change->base + line->force * change->contact[line->port];
+}
+
 #endif
