@@ -7,7 +7,7 @@ from pathlib import Path
 from vibroimpact.fmus.access_token import token_at
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
-from vibroimpact.orchestrator.fmu_server.server import FmuServer, Tls
+from vibroimpact.orchestrator.fmu_server.server import Server, Tls
 from vibroimpact.orchestrator.operations.fmu_serve import ServeFmu
 from vibroimpact.orchestrator.remote.address import SCHEME, TOKENS_VARIABLE, Address, read_address
 
@@ -23,7 +23,7 @@ def serve_fmu(options: ServeFmu) -> None:
             f"--listen: expected --certificate and --key for {address}, which other machines reach, got none."
         )
     file = options.token_file or address.token_file
-    server = FmuServer(options.file, address, token_at(file), tls)
+    server = Server(options.file, address, token_at(file), tls)
     try:
         _say_how(server, options, file)
         server.wait()
@@ -53,7 +53,7 @@ def _pem(path: Path, option: str) -> bytes:
     return content
 
 
-def _say_how(server: FmuServer, options: ServeFmu, file: Path) -> None:
+def _say_how(server: Server, options: ServeFmu, file: Path) -> None:
     """Print the address, and the lines by which a scene reaches the FMU."""
     address: Address = server.address
     say(f"{options.file.name} (SHA-256 {server.fmu.sha256[:16]}...) at {SCHEME}{address}. Ctrl-C ends it.")

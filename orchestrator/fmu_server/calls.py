@@ -86,7 +86,7 @@ class ServedInstance:
         try:
             self._make(_batch_in(data), answer)
         except (Refused, ComponentError) as refusal:
-            answer.refusal = " ".join(str(refusal).split())
+            answer.refusal = " ".join(str(refusal).split()).encode("utf-8", "replace").decode()
         answer.log.extend(self._log.take())
         return answer.SerializeToString(), not answer.refusal and not self._is_fatal
 

@@ -37,7 +37,7 @@ class FmuProcess:
         path.write_bytes(bytes(NOTES_SIZE))
         self._notes = Notes(path)
         self._lock = threading.Lock()
-        self._is_busy = self._is_ended = False
+        self._is_busy = self._is_ended = self._is_abandoned = False
         if sys.platform == "win32":
             self._process = Process("-m", SUPERVISOR, "0", CHILD)
         else:
@@ -57,7 +57,9 @@ class FmuProcess:
         ProcessEnded
             The process ended before it answered.
         """
-        self._is_busy = True
+        self._is_busy = True  # before the look at the other flag: `abandon` sees one of the two
+        if self._is_abandoned:
+            raise ProcessEnded("its caller is gone")
         self._process.say([LENGTH.pack(len(batch)), batch])
         head = self._process.stdout.read(LENGTH.size)
         answer = self._process.stdout.read(1 + LENGTH.unpack(head)[0]) if len(head) == LENGTH.size else b""
@@ -76,7 +78,8 @@ class FmuProcess:
         )
 
     def abandon(self) -> None:
-        """End the process if it is in a call whose caller is gone; the FMU may never come back."""
+        """Make no further call; end the process if it is in one, from which the FMU may never come back."""
+        self._is_abandoned = True
         if self._is_busy:
             self._process.terminate()
 

@@ -70,7 +70,7 @@ class _Stream:
         self.last = math.inf  # time of the last answer, s; infinite during a call
 
 
-class FmuServer:
+class Server:
     """A server of one FMU at an address, until it is closed.
 
     Parameters
@@ -228,7 +228,7 @@ class FmuServer:
 class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]  # grpc carries no types
     """Finds the function that answers a call; a call without the token meets a refusal alone."""
 
-    def __init__(self, server: FmuServer) -> None:
+    def __init__(self, server: Server) -> None:
         self._server = server
 
     def service(self, handler_call_details: Any) -> Any:
@@ -238,7 +238,8 @@ class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]  # grpc carries no
         if details.method not in (DESCRIBE, RUN) and refusal is None:
             return None
         if refusal is not None:
-            return grpc.unary_unary_rpc_method_handler(lambda request, context: context.abort(*refusal))
+            # a stream: nothing is waited for, which a stranger may never send
+            return grpc.stream_unary_rpc_method_handler(lambda requests, context: context.abort(*refusal))
         if details.method == DESCRIBE:
             return grpc.unary_unary_rpc_method_handler(self._server.describe)
         return grpc.stream_stream_rpc_method_handler(self._server.run)
@@ -262,6 +263,6 @@ def served_fmu(file: Path) -> UnpackedFmu:
     return fmu
 
 
-def written_address(server: FmuServer) -> str:
+def written_address(server: Server) -> str:
     """Return the address of a server as a scene names it."""
     return f"{SCHEME}{server.address}"

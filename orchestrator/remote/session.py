@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from queue import SimpleQueue
 from typing import Any
 
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.errors import ComponentError, LostComponentError
 from vibroimpact.orchestrator.remote.address import SCHEME, FmuServer
 from vibroimpact.orchestrator.remote.channel import (
     CONNECT_SECONDS,
@@ -64,7 +64,7 @@ class Session:
             self._requests: SimpleQueue[Any] = SimpleQueue()
             self._stream = call(iter(self._requests.get, None), metadata=metadata)
             try:
-                return self._exchanged(first, max(START_SECONDS, server.seconds))
+                return self._exchanged(first, max(START_SECONDS, server.seconds), "Instantiate", math.nan)
             except grpc.RpcError as error:
                 if is_absent(error) and time.monotonic() < end:
                     time.sleep(RETRY_SECONDS)
@@ -88,15 +88,20 @@ class Session:
             The stream has failed; it is closed.
         """
         try:
-            return self._exchanged(calls, self._server.seconds)
+            return self._exchanged(calls, self._server.seconds, function, at)
         except grpc.RpcError as error:
             raise self._failure(error, function, at) from None
 
-    def _exchanged(self, calls: Sequence[Any], seconds: float) -> Any:
+    def _exchanged(self, calls: Sequence[Any], seconds: float, function: str, at: float) -> Any:
         self._begin_watch(seconds)
         try:
             self._requests.put(Batch(calls=calls))
             return next(self._stream)
+        except StopIteration:
+            where = self._where(function, at)
+            self.close()
+            what = f"{where}: expected an answer, got the end of its stream."
+            raise LostComponentError(what, instance=self._name, function=function, time=at) from None
         finally:
             self._deadline = math.inf
 
@@ -117,10 +122,13 @@ class Session:
     def _failure(self, error: Any, function: str, at: float) -> ComponentError:
         """Close the stream and return the error of its failure."""
         late = self._server.seconds if self._is_late else 0.0
-        when = "" if math.isnan(at) else f" at time {at:.17g}"
-        found = loss_of(error, f"{self._name}: {function} of {SCHEME}{self._server.address}{when}", late)
+        found = loss_of(error, self._where(function, at), late)
         self.close()
         return type(found)(found.message, instance=self._name, function=function, time=at)
+
+    def _where(self, function: str, at: float) -> str:
+        when = "" if math.isnan(at) else f" at time {at:.17g}"
+        return f"{self._name}: {function} of {SCHEME}{self._server.address}{when}"
 
     def close(self) -> None:
         """End the stream, and so the instance."""

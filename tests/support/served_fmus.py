@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from vibroimpact.orchestrator.fmu_server.server import FmuServer as Server
-from vibroimpact.orchestrator.fmu_server.server import Tls
+from vibroimpact.orchestrator.fmu_server.server import Server, Tls
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
 from vibroimpact.orchestrator.remote.address import TOKENS_VARIABLE, Address, FmuServer
 from vibroimpact.orchestrator.remote.description import served_fmu

@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmu_server import server as serving
 from vibroimpact.orchestrator.fmu_server.calls import ServedInstance
-from vibroimpact.orchestrator.fmu_server.server import FmuServer
+from vibroimpact.orchestrator.fmu_server.server import Server
 from vibroimpact.orchestrator.remote.address import Address
 from vibroimpact.orchestrator.remote.channel import grpc
 from vibroimpact.orchestrator.remote.protocol import (
@@ -43,14 +43,14 @@ KNOWN = ((TOKEN_KEY, f"Bearer {TOKEN}"), (PROTOCOL_KEY, PROTOCOL))
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[FmuServer]:
-    found = FmuServer(fmu_path("ImpactStop"), HERE, TOKEN)
+def server() -> Iterator[Server]:
+    found = Server(fmu_path("ImpactStop"), HERE, TOKEN)
     yield found
     found.close()
 
 
 @pytest.fixture(scope="module")
-def channel(server: FmuServer) -> Iterator[Any]:
+def channel(server: Server) -> Iterator[Any]:
     with grpc.insecure_channel(str(server.address)) as found:
         yield found
 
@@ -73,7 +73,7 @@ def refused(channel: Any, metadata: Iterable[tuple[str, str]], code: str, text: 
         assert text in error.details()
 
 
-def test_a_call_without_the_token_meets_a_refusal_alone(server: FmuServer, channel: Any) -> None:
+def test_a_call_without_the_token_meets_a_refusal_alone(server: Server, channel: Any) -> None:
     text = "expected the token of this server, got none or another."
     for token in ((), ((TOKEN_KEY, "Bearer "),), ((TOKEN_KEY, f"Bearer {TOKEN}x"),), ((TOKEN_KEY, TOKEN),)):
         refused(channel, (*token, KNOWN[1]), "UNAUTHENTICATED", text)
@@ -81,7 +81,7 @@ def test_a_call_without_the_token_meets_a_refusal_alone(server: FmuServer, chann
     assert described(channel, KNOWN).name == "ImpactStop.fmu"
 
 
-def test_another_version_and_another_fmu_are_named(server: FmuServer, channel: Any) -> None:
+def test_another_version_and_another_fmu_are_named(server: Server, channel: Any) -> None:
     refused(channel, (KNOWN[0], (PROTOCOL_KEY, "9")), "FAILED_PRECONDITION", "version '1' of the messages")
     refused(
         channel,
@@ -99,13 +99,13 @@ def test_an_unknown_method_is_none_of_the_server(channel: Any) -> None:
         assert error.code().name in ("UNIMPLEMENTED", "INVALID_ARGUMENT")
 
 
-def test_bytes_that_are_no_message_end_their_stream(server: FmuServer, channel: Any) -> None:
+def test_bytes_that_are_no_message_end_their_stream(server: Server, channel: Any) -> None:
     (answer,) = answers(channel, b"\xff" * 40, b"never read")
     assert answer.refusal == "expected a batch of calls, got bytes that are no message."
     assert described(channel, KNOWN).sha256 == server.fmu.sha256
 
 
-def test_a_message_above_the_limit_is_refused_unread(server: FmuServer, channel: Any) -> None:
+def test_a_message_above_the_limit_is_refused_unread(server: Server, channel: Any) -> None:
     with pytest.raises(grpc.RpcError) as refusal:
         answers(channel, bytes(8 * 2**20))
     error: Any = refusal.value
@@ -114,7 +114,7 @@ def test_a_message_above_the_limit_is_refused_unread(server: FmuServer, channel:
 
 def test_instances_are_bounded_and_idle_ones_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serving, "MOST_INSTANCES", 1)
-    server = FmuServer(fmu_path("ImpactStop"), HERE, TOKEN, idle=1.0)
+    server = Server(fmu_path("ImpactStop"), HERE, TOKEN, idle=1.0)
 
     def waiting() -> Iterator[bytes]:
         yield Batch(calls=[BEGIN]).SerializeToString()
@@ -181,7 +181,7 @@ def test_a_call_that_no_importer_makes_is_refused(call: Any, text: str) -> None:
     assert text in refusal_of(BEGIN, call)
 
 
-def test_no_call_is_made_before_an_instance(server: FmuServer) -> None:
+def test_no_call_is_made_before_an_instance(server: Server) -> None:
     assert "expected Instantiate once, before all other calls" in refusal_of(Call(function="Terminate"))
     assert "expected a name and three flags" in refusal_of(Call(function="Instantiate"))
     assert "expected 1 to 4096 calls" in refusal_of()
@@ -225,9 +225,9 @@ def test_drawn_calls_of_a_body_are_answered_or_refused(calls: list[Any]) -> None
 
 def test_an_fmu_that_cannot_be_served_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ComponentFileError, match="expected an FMU for co-simulation, got one without it"):
-        FmuServer(fmu_factory.exchanged(tmp_path), HERE, TOKEN)
+        Server(fmu_factory.exchanged(tmp_path), HERE, TOKEN)
 
 
 def test_beyond_this_machine_there_is_tls_or_nothing() -> None:
     with pytest.raises(UsageError, match=r"expected --certificate and --key for 0\.0\.0\.0:0"):
-        FmuServer(fmu_path("ImpactStop"), Address("0.0.0.0", 0), TOKEN)
+        Server(fmu_path("ImpactStop"), Address("0.0.0.0", 0), TOKEN)

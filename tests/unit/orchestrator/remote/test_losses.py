@@ -16,7 +16,7 @@ from support.served_fmus import HERE, SECONDS, TOKEN, Servers, certificate, else
 
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.fmus.errors import ComponentError, LateComponentError, LostComponentError, SceneError
-from vibroimpact.orchestrator.fmu_server.server import FmuServer as Server
+from vibroimpact.orchestrator.fmu_server.server import Server
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec
 from vibroimpact.orchestrator.remote import description, session

@@ -136,9 +136,9 @@ def test_a_step_is_one_batch(served: Servers, version: str, monkeypatch: pytest.
     batches: list[list[str]] = []
     exchanged = Session._exchanged
 
-    def noted(self: Session, calls: Sequence[Any], seconds: float) -> Any:
+    def noted(self: Session, calls: Sequence[Any], *more: Any) -> Any:
         batches.append([call.function for call in calls])
-        return exchanged(self, calls, seconds)
+        return exchanged(self, calls, *more)
 
     monkeypatch.setattr(Session, "_exchanged", noted)
     parts = [served.there(body("b", P11, version)), body("d", P11)]
