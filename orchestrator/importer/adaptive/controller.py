@@ -70,7 +70,8 @@ class StepController:
         self.size = self._settled = size * max(ratio, MOST_SHRINKING)
         self._may_grow = False
 
-    def begin_anew(self) -> None:
-        """Choose a small size after an event."""
-        self.size = min(self.size, max(self.first, AFTER_EVENT * self._settled))
+    def begin_anew(self, *, may_reject: bool) -> None:
+        """Choose a small size after an event: the first one where no step can be taken back."""
+        least = AFTER_EVENT * self._settled if may_reject else 0.0
+        self.size = min(self.size, max(self.first, least))
         self._last_error, self._may_grow = 1.0, True

@@ -8,6 +8,8 @@ from vibroimpact.orchestrator.importer.adaptive.outputs import Floats, Outputs
 
 #: Error over the tolerance above which values have jumped: a line through them says nothing about the next step.
 JUMP = 100.0
+#: Length of a step over the next one, below which rounding hides the slope of the line.
+INFORMATIVE_PART = 1e-3
 
 
 class Extrapolation:
@@ -22,13 +24,12 @@ class Extrapolation:
         The outputs.
     tolerance : float
         Relative error of a step.
-    counts_change : bool
-        With the second term.
+    is_coupling : bool
+        The outputs are connected. Else they show a path, and the second term is left out.
     """
 
-    def __init__(self, outputs: Outputs, tolerance: float, *, counts_change: bool) -> None:
-        self.outputs, self.tolerance = outputs, tolerance
-        self._counts_change = counts_change
+    def __init__(self, outputs: Outputs, tolerance: float, *, is_coupling: bool) -> None:
+        self.outputs, self.tolerance, self.is_coupling = outputs, tolerance, is_coupling
         self._points: list[tuple[float, Floats]] = []
 
     def begin(self, time: float, window: float) -> None:
@@ -56,11 +57,11 @@ class Extrapolation:
         error = np.zeros(len(outputs))
         if points:
             last, before = points[-1]
-            if self._counts_change:
+            if self.is_coupling:
                 change = outputs.over_scale(outputs.difference(values, before), before, values, end, size)
                 error = 0.5 * change * change
-            if len(points) > 1:
-                earlier, start = points[0]
+            earlier, start = points[0]
+            if last - earlier > INFORMATIVE_PART * size:
                 line = before + (before - start) * ((end - last) / (last - earlier))
                 error = error + outputs.over_scale(
                     outputs.difference(values, line), before, values, end, size
