@@ -34,7 +34,7 @@ class Extrapolation:
 
     def begin(self, time: float, window: float) -> None:
         """Start a run at `time`, s; the first `window` s of a motion give no scale."""
-        self.outputs.begin(window)
+        self.outputs.begin(window, self.tolerance)
         self.begin_anew(time)
 
     def begin_anew(self, time: float) -> None:
@@ -66,9 +66,9 @@ class Extrapolation:
                 error = error + outputs.over_scale(
                     outputs.difference(values, line), before, values, end, size
                 )
-            if first:
-                error[outputs.rises(values, end)] = 0.0
             error /= self.tolerance
+            if first:
+                error = outputs.without_first(error, values, end)
         jumps = bool(np.any(error > JUMP))
         self._points = [*([] if jumps else points[-1:]), (end, values)]
         outputs.learn(end, values)

@@ -211,7 +211,7 @@ class AdaptiveSteps:
         self._controller.begin(max(self._first_part * self._span, self._shortest(time)))
         window = WINDOW * self._span
         if self._can_halve:
-            self._halved.begin(window)
+            self._halved.begin(window, self._tolerance)
             self._halved.learn(time, self._halved.read())
         for line in self._all_lines:
             line.begin(time, window)
@@ -271,7 +271,7 @@ class AdaptiveSteps:
         after = np.where(np.abs(halves) > np.abs(whole), halves, whole)
         errors = outputs.over_scale(errors, start, after, end, size) / self._tolerance
         if self._is_first(size):
-            errors[outputs.rises(after, end)] = 0.0
+            errors = outputs.without_first(errors, after, end)
         found = _worst(errors, outputs.names)
         if found[0] <= 1.0:
             outputs.learn(end, whole)
