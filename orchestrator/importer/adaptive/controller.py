@@ -10,8 +10,8 @@ SAFETY = 0.9
 PRESENT, LAST = 0.7, 0.4
 #: Least and largest ratio of two sizes in a row. A growth of at most 2 shows a fast motion before a step skips it.
 MOST_SHRINKING, MOST_GROWTH = 0.2, 2.0
-#: Error over the tolerance below which a step counts as exact.
-LEAST_ERROR = 1e-8
+#: Error over the tolerance below which the error counts as this: a smaller one, as the last, would shorten the next step.
+LEAST_ERROR = 1e-2
 #: First size after an event, over the size that errors have last chosen.
 AFTER_EVENT = 0.1
 #: A step this much longer than the chosen size may end at its limit, instead of a very short step before it.
@@ -70,7 +70,8 @@ class StepController:
         self.size = self._settled = size * max(ratio, MOST_SHRINKING)
         self._may_grow = False
 
-    def begin_anew(self) -> None:
-        """Choose a small size after an event."""
-        self.size = min(self.size, max(self.first, AFTER_EVENT * self._settled))
+    def begin_anew(self, *, may_reject: bool) -> None:
+        """Choose a small size after an event: the first one where no step can be taken back."""
+        least = AFTER_EVENT * self._settled if may_reject else 0.0
+        self.size = min(self.size, max(self.first, least))
         self._last_error, self._may_grow = 1.0, True

@@ -8,6 +8,8 @@ from vibroimpact.orchestrator.importer.adaptive.outputs import Floats, Outputs
 
 #: Error over the tolerance above which values have jumped: a line through them says nothing about the next step.
 JUMP = 100.0
+#: Length of a step over the next one, below which rounding hides the slope of the line.
+INFORMATIVE_PART = 1e-3
 
 
 class Extrapolation:
@@ -22,18 +24,17 @@ class Extrapolation:
         The outputs.
     tolerance : float
         Relative error of a step.
-    counts_change : bool
-        With the second term.
+    is_coupling : bool
+        The outputs are connected. Else they show a path, and the second term is left out.
     """
 
-    def __init__(self, outputs: Outputs, tolerance: float, *, counts_change: bool) -> None:
-        self.outputs, self.tolerance = outputs, tolerance
-        self._counts_change = counts_change
+    def __init__(self, outputs: Outputs, tolerance: float, *, is_coupling: bool) -> None:
+        self.outputs, self.tolerance, self.is_coupling = outputs, tolerance, is_coupling
         self._points: list[tuple[float, Floats]] = []
 
     def begin(self, time: float, window: float) -> None:
         """Start a run at `time`, s; the first `window` s of a motion give no scale."""
-        self.outputs.begin(window)
+        self.outputs.begin(window, self.tolerance)
         self.begin_anew(time)
 
     def begin_anew(self, time: float) -> None:
@@ -56,18 +57,18 @@ class Extrapolation:
         error = np.zeros(len(outputs))
         if points:
             last, before = points[-1]
-            if self._counts_change:
+            if self.is_coupling:
                 change = outputs.over_scale(outputs.difference(values, before), before, values, end, size)
                 error = 0.5 * change * change
-            if len(points) > 1:
-                earlier, start = points[0]
+            earlier, start = points[0]
+            if last - earlier > INFORMATIVE_PART * size:
                 line = before + (before - start) * ((end - last) / (last - earlier))
                 error = error + outputs.over_scale(
                     outputs.difference(values, line), before, values, end, size
                 )
-            if first:
-                error[outputs.rises(values, end)] = 0.0
             error /= self.tolerance
+            if first:
+                error = outputs.without_first(error, values, end)
         jumps = bool(np.any(error > JUMP))
         self._points = [*([] if jumps else points[-1:]), (end, values)]
         outputs.learn(end, values)

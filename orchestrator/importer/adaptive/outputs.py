@@ -13,6 +13,8 @@ Floats = NDArray[np.float64]
 REAL_KINDS = ("Float64", "Float32")
 #: Difference that counts as rounding, over the largest value with the same unit.
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+#: Error over the tolerance that keeps a step's size.
+STEADY = 0.5
 #: Scale of values that have always been 0.
 SMALLEST = float(np.finfo(np.float64).tiny)
 
@@ -50,15 +52,18 @@ class Outputs:
         places = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
         self._unit = np.array([places[unit] for unit in units], dtype=np.intp)
         self._unit_count = len(places)
-        self.begin(0.0)
+        self.begin(0.0, 1.0)
 
     def __len__(self) -> int:
         """Return the number of variables."""
         return len(self.names)
 
-    def begin(self, window: float) -> None:
-        """Forget all scales; an output has none in the first `window` s of its motion, only an outlook."""
-        self._window = window
+    def begin(self, window: float, tolerance: float) -> None:
+        """Forget all scales; an output has none in the first `window` s of its motion, only an outlook.
+
+        Rounding is at most the tolerance of any scale.
+        """
+        self._window, self._tolerance = window, tolerance
         self.known = np.zeros(len(self.names))
         self.since = np.full(len(self.names), np.inf)
         self._rounding = np.zeros(len(self.names))
@@ -104,12 +109,16 @@ class Outputs:
         end, size : float
             End and length of the step, s.
         """
-        scale = np.fmax(self.known, np.abs(after))
+        scale = np.fmax(np.fmax(self.known, np.abs(after)), self._rounding / self._tolerance)
         if end < self._all_known:
             slope = np.abs(after - before) / size
             scale = np.fmax(scale, np.where(self.rises(after, end), slope * self._left(end), 0.0))
         ratio = errors / np.fmax(scale, SMALLEST)
         return ratio if np.isfinite(scale).all() else np.where(errors == 0.0, 0.0, np.inf)
+
+    def without_first(self, errors: Floats, values: Floats, time: float) -> Floats:
+        """Return errors over the tolerance in a step of the first size: values that begin to move keep this size."""
+        return np.where(self.rises(values, time), np.minimum(errors, STEADY), errors)
 
     def rises(self, values: Floats, time: float) -> NDArray[np.bool_]:
         """Return which variables are at a new largest value within the first `window` s of their motion."""

@@ -114,12 +114,12 @@ class AdaptiveSteps:
         self._halved = Outputs(halved(parts, sources))
         others = Outputs([source for source in sources if not source[0].has_states])
         lines = [
-            Extrapolation(others, tolerance, counts_change=True),
-            Extrapolation(Outputs(points), PATH_TOLERANCE, counts_change=False),
+            Extrapolation(others, tolerance, is_coupling=True),
+            Extrapolation(Outputs(points), PATH_TOLERANCE, is_coupling=False),
         ]
         self._lines = [line for line in lines if len(line.outputs)]
         restorable = Outputs([source for source in sources if source[0].has_states])
-        self._restorable = Extrapolation(restorable, tolerance, counts_change=True)
+        self._restorable = Extrapolation(restorable, tolerance, is_coupling=True)
         self._first_part = FIRST_WITH_CONTACTS if points else FIRST
         self._slots = {c.name: c_void_p() for c in plan.saved}
         self.record = StepRecord()
@@ -183,18 +183,22 @@ class AdaptiveSteps:
             self._can_halve and not self._parts.contacts.active,
             self._parts.ticks.are_due(reached),
         )
+        coupling_error = error[0]
         importer.accept(time, planned)
         if ticks or importer.event_time >= reached:
             self.record.add(size, error[0] * self._tolerance, cut=cut)
-            self._controller.begin_anew()
+            self._controller.begin_anew(may_reject=is_halved)
             for line in self._all_lines:
                 line.begin_anew(reached)
             return
         for line in self._all_lines:
             found = _worst(line.errors(reached, size, first=self._is_first(size)), line.outputs.names)
-            if found[0] > error[0] and not (is_halved and line is self._restorable):
-                error = found
-        self.record.add(size, error[0] * self._tolerance, cut=cut)
+            if is_halved and line is self._restorable:
+                continue
+            error = max(error, found)
+            if line.is_coupling:
+                coupling_error = max(coupling_error, found[0])
+        self.record.add(size, coupling_error * self._tolerance, cut=cut)
         self._controller.accept(size, error[0], cut=cut)
         self._bound_size(reached, size, error)
 
@@ -207,7 +211,7 @@ class AdaptiveSteps:
         self._controller.begin(max(self._first_part * self._span, self._shortest(time)))
         window = WINDOW * self._span
         if self._can_halve:
-            self._halved.begin(window)
+            self._halved.begin(window, self._tolerance)
             self._halved.learn(time, self._halved.read())
         for line in self._all_lines:
             line.begin(time, window)
@@ -267,7 +271,7 @@ class AdaptiveSteps:
         after = np.where(np.abs(halves) > np.abs(whole), halves, whole)
         errors = outputs.over_scale(errors, start, after, end, size) / self._tolerance
         if self._is_first(size):
-            errors[outputs.rises(after, end)] = 0.0
+            errors = outputs.without_first(errors, after, end)
         found = _worst(errors, outputs.names)
         if found[0] <= 1.0:
             outputs.learn(end, whole)
