@@ -28,6 +28,7 @@ class ExchangeCall(IntEnum):
     free = 12
     set_inputs = 13
     get_watched = 14
+    set_forces = 15
 
 
 class ExchangeReason(IntEnum):
@@ -58,12 +59,24 @@ class CVode(Structure):
     ]
 
 
+class WatchedLaw(Structure):
+    """The contact law of a watched stop; the fields are explained in `contact/contact_law.h`."""
+
+    _fields_ = [
+        ("law", c_int64),
+        *((name, c_double) for name in ("restitution", "yield_velocity", "stiffness", "damping", "exponent")),
+    ]
+
+
 class ExchangeWatch(Structure):
     """A watched point of an FMU; the fields are explained in `door/model_exchange.h`."""
 
     _fields_ = [
         *((name, c_double) for name in ("factor", "offset", "room", "level")),
         *((name, c_int32) for name in ("value", "rate", "direction", "is_armed")),
+        *((name, c_int32) for name in ("is_pressed", "was_pressed", "force")),
+        ("law", WatchedLaw),
+        *((name, c_double) for name in ("impulse", "largest")),
     ]
 
 
@@ -78,15 +91,17 @@ class Exchange(Structure):
         ("numbers", c_int64 * len(ExchangeCall)),
         *((name, c_void_p) for name in ("states", "kept", "absolute", "indicators", "compared")),
         *((name, c_void_p) for name in ("watches", "watched", "values", "roots", "directions")),
-        *((name, c_void_p) for name in ("point", "instants", "samples")),
+        *((name, c_void_p) for name in ("forces", "given", "point", "instants", "samples")),
         *((name, c_int64) for name in ("state_count", "indicator_count", "most_steps")),
-        *((name, c_int64) for name in ("watch_count", "watched_count", "instant_count", "sample_count")),
+        *((name, c_int64) for name in ("watch_count", "watched_count", "force_count")),
+        *((name, c_int64) for name in ("instant_count", "sample_count")),
         *((name, c_int32) for name in ("most_iterations", "version", "needs_completed", "restorable")),
         *((name, c_double) for name in ("tolerance", "time", "next_event")),
         *((name, c_void_p) for name in ("context", "solver", "vector", "tolerances", "matrix", "linear")),
         ("point_vector", c_void_p),
         *((name, c_int32) for name in ("has_begun", "in_event_mode", "ends", "begins_anew")),
-        *((name, c_int32) for name in ("inputs_changed", "nominals_changed", "meets")),
+        *((name, c_int32) for name in ("inputs_changed", "nominals_changed")),
+        *((name, c_int32) for name in ("gives_forces", "meets")),
         *((name, c_int32) for name in ("function", "reason", "solver_flag", "cause", "failure")),
         *((name, c_int64) for name in ("derivative_calls", "solver_steps")),
     ]

@@ -129,7 +129,7 @@ class ExchangeInstance(EventfulInstance):
     names: ClassVar[tuple[str, ...]] = (
         *("SetTime", "SetContinuousStates", "GetContinuousStates", "Get{derivatives}", "GetEventIndicators"),
         *("GetNominalsOfContinuousStates", "CompletedIntegratorStep", "EnterEventMode", "{update}"),
-        *("EnterContinuousTimeMode", "Get{state}", "Set{state}", "Free{state}", "", "Get{real}"),
+        *("EnterContinuousTimeMode", "Get{state}", "Set{state}", "Free{state}", "", "Get{real}", "Set{real}"),
     )
     own_words: ClassVar[dict[str, str]]
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.core.model_exchange import Exchange, ExchangeWatch
+from vibroimpact.fmus.core.model_exchange import Exchange, ExchangeWatch, WatchedLaw
 
 Direction = Literal["falling", "rising", "either"]
 DIRECTIONS: dict[Direction, int] = {"falling": -1, "rising": 1, "either": 0}
@@ -28,6 +30,32 @@ class ContactWatch:
         """Put the surface at a position, m, above the point (side 1) or below it (side -1)."""
         self._watch.factor, self._watch.offset = -side, side * position
 
+    def press_by(self, law: WatchedLaw, force: int) -> None:
+        """Let a stop that yields press the point by its law, through the force input with this value reference."""
+        watch = self._watch
+        watch.law, watch.force, watch.impulse = law, self._owner.force_place(force), 0.0
+        watch.is_pressed = 0
+
+    @property
+    def is_pressed(self) -> bool:
+        """Does the stop press the point?"""
+        return bool(self._watch.is_pressed)
+
+    @is_pressed.setter
+    def is_pressed(self, value: bool) -> None:
+        self._watch.is_pressed = value
+        self._owner.begin_anew()
+
+    @property
+    def impulse(self) -> float:
+        """Impulse of the stop so far, N s."""
+        return float(self._watch.impulse)
+
+    @property
+    def largest(self) -> float:
+        """Largest force of the stop in the last step, N."""
+        return float(self._watch.largest)
+
     def arm(self, room: float) -> None:
         """Find meetings in the next step; below the distance `room`, m, the point touches the surface already."""
         if not self._watch.is_armed:
@@ -36,7 +64,8 @@ class ContactWatch:
 
     def disarm(self) -> None:
         """Find no meetings: the point rests on the surface, or the run has no such contact."""
-        self._watch.is_armed = 0
+        self._watch.is_armed = self._watch.is_pressed = 0
+        self._watch.law = WatchedLaw()
 
 
 class WatchedPoints:
@@ -54,6 +83,7 @@ class WatchedPoints:
         self.watches = (ExchangeWatch * 0)()
         self.has_contacts = False
         self._references: list[int] = []
+        self._forces: list[int] = []
         self._contacts: list[ContactWatch] = []
         self._instants = self._samples = np.zeros(0)
 
@@ -75,6 +105,13 @@ class WatchedPoints:
             self._references.append(reference)
         return self._references.index(reference)
 
+    def force_place(self, reference: int) -> int:
+        """Return the place of a force input, by its value reference."""
+        if reference not in self._forces:
+            self._forces.append(reference)
+            self._bind()
+        return self._forces.index(reference)
+
     def _add(self, watch: ExchangeWatch) -> int:
         self.watches = (ExchangeWatch * (len(self.watches) + 1))(*self.watches, watch)
         self._bind()
@@ -84,6 +121,7 @@ class WatchedPoints:
         """Start a run: contacts have their part in it once they are armed."""
         for contact in self._contacts:
             contact.disarm()
+        self._forces, self._exchange.gives_forces = [], 0
         self._bind()
         self.keep_samples(np.zeros(0))
 
@@ -99,11 +137,27 @@ class WatchedPoints:
         values, roots = np.zeros(len(references)), np.zeros(len(directions) or 1, dtype=np.intc)
         numbers = np.array(directions or [0], dtype=np.intc)
         # C code holds their addresses
-        self._kept: list[NDArray[Any]] = [references, values, roots, numbers]
+        forces = np.array(self._forces, dtype=np.uint32)
+        given = np.zeros(len(forces))
+        self._kept: list[NDArray[Any]] = [references, values, roots, numbers, forces, given]
         exchange.watches = ctypes.addressof(self.watches)
-        for name, array in zip(("watched", "values", "roots", "directions"), self._kept, strict=True):
+        names = ("watched", "values", "roots", "directions", "forces", "given")
+        for name, array in zip(names, self._kept, strict=True):
             setattr(exchange, name, array.ctypes.data)
         exchange.watch_count, exchange.watched_count = len(self.watches), len(references)
+        exchange.force_count = len(forces)
+
+    @contextmanager
+    def as_within_step(self) -> Iterator[None]:
+        """Let stops that yield press inside as they did within the last step, whose end may have changed them."""
+        pressed = [watch.is_pressed for watch in self.watches]
+        for watch in self.watches:
+            watch.is_pressed = watch.was_pressed
+        try:
+            yield
+        finally:
+            for watch, value in zip(self.watches, pressed, strict=True):
+                watch.is_pressed = value
 
     # ---- samples ----
 

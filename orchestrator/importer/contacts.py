@@ -8,6 +8,7 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts
 from vibroimpact.orchestrator.importer.pairs.all_pairs import Pairs
+from vibroimpact.orchestrator.importer.pairs.ends import PointEnd
 from vibroimpact.orchestrator.importer.pairs.pair import Pair
 from vibroimpact.orchestrator.importer.pairs.rigid_stops import RigidStop
 from vibroimpact.orchestrator.importer.specification import (
@@ -25,6 +26,7 @@ from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import (
 )
 from vibroimpact.orchestrator.importer.stop_contacts.force_input import ForceInputs
 from vibroimpact.orchestrator.importer.stop_contacts.held_force import HeldForceBond
+from vibroimpact.orchestrator.importer.stop_contacts.law_bond import LawBond, law_bond_of
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
 #: Communication steps that a contact is divided into by default.
@@ -61,7 +63,8 @@ class ContactBonds:
         self._components, self._inputs = components, inputs
         self._rigid: dict[str, RigidStop] = {}
         self._held: list[HeldForceBond] = []
-        self._following: list[ContactBond | HeldForceBond | Pair] = []
+        self._laws: dict[str, LawBond] = {}
+        self._following: list[ContactBond | HeldForceBond | LawBond | Pair] = []
         self.met_at_start: list[Component] = []
         """Bodies without event mode whose contacts begin with the first step of a run."""
         self.active = False
@@ -91,9 +94,34 @@ class ContactBonds:
         for bond in self._all():
             bond.begin()
         self.pairs.begin(time, [self._rigid_stop(bond) for bond in self.held if bond.stop.is_rigid])
-        self._held = [bond for bond in self.held if not bond.stop.is_rigid]
-        self._following = [*(bond for bond in self.ports if bond.follows), *self._held, *self.pairs.pairs]
+        yielding = [bond for bond in self.held if not bond.stop.is_rigid]
+        self._laws = self._begun_laws(yielding)
+        self._held = [bond for bond in yielding if bond.name not in self._laws]
+        for bond in self._held:
+            bond.refuse_model_exchange()
+        follows = (bond for bond in self.ports if bond.follows)
+        self._following = [*follows, *self._held, *self._laws.values(), *self.pairs.pairs]
         self.active = False
+
+    def _begun_laws(self, yielding: Sequence[HeldForceBond]) -> dict[str, LawBond]:
+        """Begin the contacts whose force belongs to the derivatives, unless others write to their force inputs."""
+        found = {bond.name: law for bond in yielding if (law := law_bond_of(bond)) is not None}
+        others = {end.input for pair in self.pairs.pairs for end in pair.ends if isinstance(end, PointEnd)}
+        others |= {bond.input for bond in yielding if bond.name not in found}
+        free = {name: law for name, law in found.items() if law.input not in others}
+        if all([law.begin() for law in free.values()]):
+            return free
+        for law in free.values():
+            law.end()
+        return {}
+
+    @property
+    def _yielding(self) -> list[HeldForceBond | LawBond]:
+        return [*self._held, *self._laws.values()]
+
+    def law_of(self, stop: Component) -> LawBond | None:
+        """Return the contact of a stop whose force belongs to the derivatives of its body; None for others."""
+        return next((law for law in self._laws.values() if law.stop is stop), None)
 
     def _rigid_stop(self, bond: HeldForceBond) -> RigidStop:
         found = self._rigid.get(bond.name)
@@ -112,7 +140,7 @@ class ContactBonds:
             target = bond.begin_step(time, target, self._steps)
         self.active = any(bond.active for bond in self._following)
         met = [pair.lower.body for pair in self.pairs.pairs if pair.begins_pressed]
-        self.met_at_start = [*(bond.body for bond in self._held if bond.begins_pressed), *met]
+        self.met_at_start = [*(bond.body for bond in self._yielding if bond.begins_pressed), *met]
         return target
 
     def apply(self) -> None:
@@ -144,7 +172,7 @@ class ContactBonds:
             bond.end_step(size)
         self.pairs.pulses.end_step(size)
         met = [pair.lower.body for pair in self.pairs.pairs if pair.arrived]
-        return [*(bond.body for bond in self._held if bond.arrived), *met]
+        return [*(bond.body for bond in self._yielding if bond.arrived), *met]
 
     @property
     def impacts(self) -> tuple[list[ContactImpacts], list[ContactImpacts]]:

@@ -22,6 +22,7 @@ from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.stop_contacts.law_bond import LawBond
 
 REAL_KINDS = ("Float64", "Float32")
 
@@ -177,8 +178,9 @@ class Sampler:
         for probe in self._probes:
             if not probe.is_revisited:
                 probe.read(self._start_row)
-            if probe.exchange is not None:
-                probe.exchange.points.keep_samples(self._ahead(time))
+            instance, _ = self._moving(probe)
+            if instance is not None:
+                instance.points.keep_samples(self._ahead(time))
 
     def _ahead(self, time: float) -> NDArray[np.float64]:
         """Return the instants of samples in a step from `time`, s, which may be as long as a macro step."""
@@ -199,7 +201,7 @@ class Sampler:
     def _take_inside(self, time: float, end: float, instants: Sequence[float]) -> None:
         rows = [self._row(instant) for instant in instants]
         for probe in self._probes:
-            if probe.exchange is not None and self._follow(probe, probe.exchange, time, end, rows):
+            if self._follow(probe, time, end, rows):
                 continue
             if probe.is_revisited:
                 self._revisit(probe, time, instants, rows)
@@ -208,17 +210,25 @@ class Sampler:
         for row in rows:
             self._keep(row)
 
-    def _follow(
-        self, probe: _Probe, instance: ExchangeInstance, time: float, end: float, rows: Sequence[_Row]
-    ) -> bool:
-        """Read a component in model exchange at the states that the step has kept; returns whether it has them."""
-        found = instance.kept_samples(time, end)
-        if len(found) < len(rows):
+    def _moving(self, probe: _Probe) -> tuple[ExchangeInstance | None, LawBond | None]:
+        """Return the integrated motion that a component follows: its own, or that of a stop's body."""
+        law = self._importer.contacts.law_of(probe.component)
+        return (probe.exchange, None) if law is None else (law.instance, law)
+
+    def _follow(self, probe: _Probe, time: float, end: float, rows: Sequence[_Row]) -> bool:
+        """Read a component at the states that an integrated step has kept; returns whether there are any."""
+        instance, law = self._moving(probe)
+        if instance is None or len(found := instance.kept_samples(time, end)) < len(rows):
             return False
-        for row, states in zip(rows, found, strict=False):
-            instance.show(states, row.numbers[0])
-            probe.read(row)
+        with instance.points.as_within_step():
+            for row, states in zip(rows, found, strict=False):
+                instance.show(states, row.numbers[0])
+                if law is not None:
+                    law.show()
+                probe.read(row)
         instance.show(instance.states)
+        if law is not None:
+            law.show()
         return True
 
     def _revisit(self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[_Row]) -> None:

@@ -163,7 +163,7 @@ def _met(contact: StopContactSpec | PairSpec, exchanged: Set[str]) -> str:
         return f"{contact.name}, {contact.law}"
     how = "force held over a step"
     if contact.body in exchanged:
-        how = "impacts set its velocity" if contact.force is None else f"impulses on its states, {how}"
+        how = "impacts set its velocity" if contact.force is None else "impulses and forces on its states"
     return f"{contact.body}.{contact.displacement} on {contact.stop}, {how}"
 
 

@@ -56,13 +56,13 @@ class PortEnd:
         self._mass = self.body.group("Float64", [f"{port}.mass"])
         self._impulse = self.body.group("Float64", [f"{port}.applied_impulse"])
         self._side = self.body.group("Int64", [f"{port}.side"])
-        self._input = inputs.setdefault(end, ForceInput(self.body, f"{port}.applied_force"))
+        self.input = inputs.setdefault(end, ForceInput(self.body, f"{port}.applied_force"))
 
     def begin(self, time: float) -> None:
         """Start a run at `time`, s."""
         self.mass = float(self._mass.get()[0])
         self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
-        self._input.parts.clear()
+        self.input.parts.clear()
 
     def required_rate(self, time: float, size: float) -> float:
         """Return 0: the body gives all its rates itself (`BodyRate`)."""
@@ -70,8 +70,8 @@ class PortEnd:
 
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
-        self._input.parts[pair] = -self._direction * force
-        self._input.write()
+        self.input.parts[pair] = -self._direction * force
+        self.input.write()
 
     def look(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s)."""
@@ -106,9 +106,10 @@ class PointEnd:
         if isinstance(self.body.instance, ExchangeInstance):
             self.body.instance.points.has_contacts = True
         self._motion = self.body.group("Float64", [point.displacement, point.velocity])
-        self._input = force_input_of(self.body, point.force, inputs)
-        self._trials = TrialSteps(self.body, point.velocity, self._input)
-        self.pulse = None if pulses is None else pulses.of(point, self._input)
+        self.input = force_input_of(self.body, point.force, inputs)
+        """The force input, which all contacts of the point share."""
+        self._trials = TrialSteps(self.body, point.velocity, self.input)
+        self.pulse = None if pulses is None else pulses.of(point, self.input)
         """Its impulses; None with a yielding law."""
 
     @property
@@ -118,7 +119,7 @@ class PointEnd:
 
     def begin(self, time: float) -> None:
         """Start a run at `time`, s: a point with impulses tests that the body answers them."""
-        self._input.parts.clear()
+        self.input.parts.clear()
         if self.pulse is not None:
             self.pulse.begin(time)
 
@@ -134,8 +135,8 @@ class PointEnd:
 
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
-        self._input.parts[pair] = force
-        self._input.write()
+        self.input.parts[pair] = force
+        self.input.write()
 
     def look(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s); the velocity includes the impulse still to be given."""

@@ -84,8 +84,13 @@ class Pair:
         self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
         self.take(spec)
 
+    @property
+    def ends(self) -> tuple[PairEnd, PairEnd]:
+        """The lower end and the upper end."""
+        return self.lower, self.upper
+
     def _refuse_stateless(self) -> None:
-        for end in (self.lower, self.upper):
+        for end in self.ends:
             if not end.body.has_states:
                 raise ComponentError(
                     f"{end.body.name}: expected a body that can save its state, got one that cannot. "

@@ -107,7 +107,12 @@ class AskedStop:
     @property
     def is_rigid(self) -> bool:
         """Does the stop answer with a coefficient of restitution, and no force?"""
-        return self._law is not None and int(self._law.get()[0]) in rigid_law_numbers()
+        return self.law in rigid_law_numbers()
+
+    @property
+    def law(self) -> int:
+        """Number of the law of an ImpactStop; -1 of another stop."""
+        return -1 if self._law is None else int(self._law.get()[0])
 
     def restitution(self, speed: float) -> float:
         """Return the coefficient of restitution of a rigid stop for an impact at this speed, m/s."""

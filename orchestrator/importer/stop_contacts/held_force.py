@@ -89,8 +89,8 @@ class HeldForceBond:
         self.contact = spec
         self.stop = AskedStop(components[spec.stop], spec)
         self._outputs = self.body.group("Float64", [spec.displacement, spec.velocity])
-        self._input = force_input_of(self.body, spec.force, inputs)
-        self._trials = TrialSteps(self.body, spec.velocity, self._input)
+        self.input = force_input_of(self.body, spec.force, inputs)
+        self._trials = TrialSteps(self.body, spec.velocity, self.input)
         self.watch = _watch_of(self.body, spec)
         """Model exchange: the watch that ends steps where the body meets a rigid stop."""
         self.revisable = self.body.has_states
@@ -103,14 +103,10 @@ class HeldForceBond:
         """Energy that the body received beyond the law of the stop, J."""
 
     def begin(self) -> None:
-        """Start a run: the parameters are set.
-
-        ComponentError: a stop that yields, for a body that cannot be pressed or repeat its steps.
-        """
+        """Start a run: the parameters are set."""
         self.stop.begin()
-        self._refuse_yielding()
         self.impacts.forget()
-        self._input.parts[self.contact.stop] = 0.0
+        self.input.parts[self.contact.stop] = 0.0
         self.mass = self.given_mass
         self.active = self.closed = self.arrived = self.begins_pressed = False
         self.residual = 0.0
@@ -125,10 +121,10 @@ class HeldForceBond:
         self._limit = math.inf
         self._largest = 0.0
 
-    def _refuse_yielding(self) -> None:
-        exchanges = self.body.kind == "model_exchange"
+    def refuse_model_exchange(self) -> None:
+        """Raise ComponentError for a body in model exchange that cannot hold a force over a step and repeat it."""
         lacks = "a force input" if self.contact.force is None else "canGetAndSetFMUState"
-        if self.stop.is_rigid or not exchanges or (self.contact.force is not None and self.revisable):
+        if self.watch is None or (self.contact.force is not None and self.revisable):
             return
         raise ComponentError(
             f"{self.contact.stop}: expected a rigid stop (the law restitution) for {self.body.name}, which runs as "
@@ -141,7 +137,7 @@ class HeldForceBond:
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Prepare the contact for a step; returns where the step should end, s."""
         self._steps, self._time, self._room = steps, time, ROOM * (1.0 + abs(time))
-        self._start = self._look()
+        self._start = self.motion()
         self.stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
@@ -172,8 +168,8 @@ class HeldForceBond:
 
     def apply(self) -> None:
         """Write the force to the body."""
-        self._input.parts[self.contact.stop] = -self.stop.sign * self._force
-        self._input.write()
+        self.input.parts[self.contact.stop] = -self.stop.sign * self._force
+        self.input.write()
 
     def revised_end(self, time: float, end: float) -> float | None:
         """Return the end of the step if the last one must be repeated, s; None if it is accepted."""
@@ -222,16 +218,17 @@ class HeldForceBond:
         why = "" if self.revisable else f" of {self.contact.body}, which cannot restore its state,"
         return f"{self.name}: the held force{why} has {self._work.share(self.residual)}. Use a shorter macro_step"
 
-    def _look(self) -> tuple[float, float]:
+    def motion(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s) of the contact point, in the direction into the stop."""
         displacement, velocity = (float(v) for v in self._outputs.get())
         return self.stop.sign * displacement, self.stop.sign * velocity
 
     def _path(self, size: float) -> StepPath:
-        return StepPath(*self._start, *self._look(), size)
+        return StepPath(*self._start, *self.motion(), size)
 
     def _learn(self, path: StepPath) -> None:
         """Estimate the body's acceleration by all but this contact, now and until the next step; not by impulses."""
-        if PART in self._input.parts:
+        if PART in self.input.parts:
             return
         if self.mass is None:
             if self.closed:
@@ -297,7 +294,7 @@ class HeldForceBond:
 
         def gap(size: float) -> float:
             self.body.step_from_start(time, size)
-            return surface - self._look()[0]
+            return surface - self.motion()[0]
 
         with self.body.taken_back():
             if path.start < surface:
@@ -307,7 +304,7 @@ class HeldForceBond:
 
             def is_free(u: float) -> bool:
                 self.body.step_from_start(time, u * inside)
-                return not self.stop.force(*self._look(), u * inside) > 0.0
+                return not self.stop.force(*self.motion(), u * inside) > 0.0
 
             return last_true(is_free) * inside  # it had let go within the stop, and is in contact again
 

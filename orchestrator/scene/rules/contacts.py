@@ -179,7 +179,8 @@ def _bodies_take_impacts(draft: GeneralDraft, place: int, table: StopContactTabl
             yield Problem(where, "the name of an input of the body: the force on that point", "nothing", hint)
         return
     lacks = "force" if table.force is None else "" if body.restorable else "canGetAndSetFMUState"
-    if lacks and not _is_rigid(draft, table, stop) and not _sweeps_law(draft, table):
+    gives_law = table.force is not None and LAW in stop.variables and "applied_restitution" in stop.variables
+    if lacks and not gives_law and not _is_rigid(draft, table, stop) and not _sweeps_law(draft, table):
         got = f"{table.stop}, which yields, for {table.body} in model exchange without {lacks}"
         hint = 'Give the stop parameters = { law = "restitution", restitution = ... }.'
         yield Problem(key_path(("contact", place, "stop")), "a rigid stop", got, hint)

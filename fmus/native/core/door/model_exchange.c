@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "door/model_exchange_forces.h"
 #include "door/model_exchange_watches.h"
 
 enum { OK = VI_EXCHANGE_OK, DISCARD = VI_EXCHANGE_DISCARD, ERROR = VI_EXCHANGE_ERROR };
@@ -35,7 +36,7 @@ typedef struct {
     void *fmu_state;
     double time, next_event;
     int32_t in_event_mode, ends;
-    double numbers[]; /* states, then event indicators */
+    double numbers[]; /* states, event indicators, and for each watch: whether it is pressed, its impulse */
 } saved_state;
 
 static bool are_finite(const double numbers[], int64_t count)
@@ -88,9 +89,7 @@ static int roots_at(double time, void *states, double *roots, void *user)
 {
     vi_exchange *e = user;
     int status = vi_door_exchange_show(e, time, e->cvode->vector_data(states));
-    if (status == OK) {
-        status = vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
-    }
+    status = status != OK ? status : vi_exchange_get_numbers(e, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
     const int found = answer(e, status, VI_EXCHANGE_INDICATORS, roots, e->indicator_count);
     if (found != GOOD || e->watch_count == 0) {
         return found;
@@ -293,6 +292,17 @@ static int complete_step(vi_exchange *e, bool no_state_prior, bool *event, bool 
     return vi_exchange_judged(e, VI_EXCHANGE_COMPLETED, status);
 }
 
+/* Finish a step of CVODE from `before`: its roots, the impulses of stops up to there, and samples. */
+static int after_solver(vi_exchange *e, double before, bool has_roots, bool *root)
+{
+    int status = has_roots ? vi_exchange_judge_roots(e, before, root) : OK;
+    status = status != OK ? status : vi_exchange_add_impulses(e, before);
+    if (status == OK && has_roots) {
+        vi_exchange_change_contacts(e);
+    }
+    return status != OK ? status : vi_exchange_keep_samples(e, true);
+}
+
 /* One step of CVODE towards `goal`; `root` becomes whether an indicator has changed its sign at its end. */
 static int solver_step(vi_exchange *e, double goal, bool *root)
 {
@@ -317,8 +327,7 @@ static int solver_step(vi_exchange *e, double goal, bool *root)
             if (division > 0) {
                 c->set_longest(e->solver, 0.0); /* none */
             }
-            const int status = flag == ROOT_RETURN ? vi_exchange_judge_roots(e, before, root) : OK;
-            return status != OK ? status : vi_exchange_keep_samples(e, true);
+            return after_solver(e, before, flag == ROOT_RETURN, root);
         }
         if (e->failure != OK) { /* of the FMU: no function is called after it */
             e->reason = VI_EXCHANGE_STATUS;
@@ -440,7 +449,7 @@ int vi_door_exchange_save(vi_exchange *e, void **slot)
     const size_t states = (size_t)e->state_count, indicators = (size_t)e->indicator_count;
     saved_state *s = *slot;
     if (s == NULL) {
-        s = calloc(1, sizeof *s + sizeof(double) * (states + indicators));
+        s = calloc(1, sizeof *s + sizeof(double) * (states + indicators + 2 * (size_t)e->watch_count));
         if (s == NULL) {
             return vi_exchange_refused(e, VI_EXCHANGE_SAVE, VI_EXCHANGE_STATUS);
         }
@@ -453,6 +462,10 @@ int vi_door_exchange_save(vi_exchange *e, void **slot)
     memcpy(s->numbers, e->states, sizeof(double) * states);
     if (indicators > 0) {
         memcpy(s->numbers + states, e->indicators, sizeof(double) * indicators);
+    }
+    for (int64_t k = 0; k < e->watch_count; k++) {
+        s->numbers[states + indicators + 2 * (size_t)k] = e->watches[k].is_pressed;
+        s->numbers[states + indicators + 2 * (size_t)k + 1] = e->watches[k].impulse;
     }
     return vi_exchange_judged(e, VI_EXCHANGE_SAVE,
                               vi_exchange_begin_call(e, VI_EXCHANGE_SAVE).save(e->fmu, &s->fmu_state));
@@ -472,6 +485,11 @@ int vi_door_exchange_restore(vi_exchange *e, void *slot)
     if (indicators > 0) {
         memcpy(e->indicators, s->numbers + states, sizeof(double) * indicators);
     }
+    for (int64_t k = 0; k < e->watch_count; k++) {
+        e->watches[k].is_pressed = s->numbers[states + indicators + 2 * (size_t)k] != 0.0;
+        e->watches[k].impulse = s->numbers[states + indicators + 2 * (size_t)k + 1];
+    }
+    e->gives_forces = e->force_count > 0;
     return vi_exchange_judged(e, VI_EXCHANGE_RESTORE,
                               vi_exchange_begin_call(e, VI_EXCHANGE_RESTORE).restore(e->fmu, s->fmu_state));
 }

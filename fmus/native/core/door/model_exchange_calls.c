@@ -41,7 +41,7 @@ int vi_exchange_get_numbers(vi_exchange *e, int function, double numbers[], int6
                               vi_exchange_begin_call(e, function).get_numbers(e->fmu, numbers, (size_t)count));
 }
 
-int vi_door_exchange_show(vi_exchange *e, double time, const double states[])
+int vi_exchange_set_point(vi_exchange *e, double time, const double states[])
 {
     int status = vi_exchange_judged(e, VI_EXCHANGE_SET_TIME,
                                     vi_exchange_begin_call(e, VI_EXCHANGE_SET_TIME).set_time(e->fmu, time));
@@ -61,4 +61,15 @@ int vi_exchange_read_watched(vi_exchange *e)
     return vi_exchange_judged(e, VI_EXCHANGE_GET,
                               e->version == 3 ? call.get3(e->fmu, e->watched, count, e->values, count)
                                               : call.get2(e->fmu, e->watched, count, e->values));
+}
+
+int vi_exchange_move_point(vi_exchange *e, double time)
+{
+    const int flag = e->cvode->motion(e->solver, time, 0, e->point_vector);
+    if (flag != 0) {
+        e->solver_flag = flag;
+        e->reason = VI_EXCHANGE_SOLVER;
+        return ERROR;
+    }
+    return OK;
 }

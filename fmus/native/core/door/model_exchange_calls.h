@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "contact/contact_law.h"
 #include "door/cvode.h"
 #include "door/door.h"
 
@@ -26,7 +27,8 @@ enum {
     VI_EXCHANGE_FREE = 12,
     VI_EXCHANGE_SET = 13, /* setting of inputs, by the functions of a vi_exchange_input */
     VI_EXCHANGE_GET = 14, /* reading of watched variables */
-    VI_EXCHANGE_FUNCTIONS = 15
+    VI_EXCHANGE_SET_FORCES = 15, /* setting of the force inputs on which stops act */
+    VI_EXCHANGE_FUNCTIONS = 16
 };
 
 /* Reasons of an error. */
@@ -52,6 +54,8 @@ typedef union {
     int (*update2)(void *, void *);
     int (*get3)(void *, const uint32_t[], size_t, double[], size_t);
     int (*get2)(void *, const uint32_t[], size_t, double[]);
+    int (*put3)(void *, const uint32_t[], size_t, const double[], size_t);
+    int (*put2)(void *, const uint32_t[], size_t, const double[]);
     int (*save)(void *, void **);
     int (*restore)(void *, void *);
 } vi_exchange_function;
@@ -65,6 +69,11 @@ typedef struct {
     int32_t value, rate; /* places among the watched variables; rate: velocity of a contact point, -1 of a variable */
     int32_t direction;   /* of a variable's crossing: -1 falling, 1 rising, 0 either; a contact has -1 */
     int32_t is_armed;
+    int32_t is_pressed; /* a stop that yields presses the body, from the meeting until its force has fallen to 0 */
+    int32_t was_pressed; /* at the start of the last step, and so within it */
+    int32_t force;       /* place of its force input */
+    vi_contact_law law; /* of a stop that yields */
+    double impulse, largest; /* N s of all steps of the run; largest force of the last step, N */
 } vi_exchange_watch;
 
 /* An FMU with its solver. Buffers belong to the caller; numbers from `time` on to the functions below. */
@@ -80,12 +89,14 @@ typedef struct {
     const uint32_t *watched;                 /* [watched_count] value references */
     double *values;                          /* [watched_count] */
     int *roots, *directions;                 /* [indicator_count + 2 watch_count] functions whose roots end steps */
+    const uint32_t *forces;                  /* [force_count] value references of force inputs */
+    double *given;                           /* [force_count] N */
     double *point;                           /* [state_count or 1] states between two steps of CVODE */
     const double *instants;                  /* [instant_count] ascending, s: a step keeps the states there */
     double *samples;                         /* [instant_count][state_count] */
     int64_t state_count, indicator_count;
     int64_t most_steps;                      /* of CVODE in one step */
-    int64_t watch_count, watched_count, instant_count;
+    int64_t watch_count, watched_count, force_count, instant_count;
     int64_t sample_count;                    /* instants that the last step has kept */
     int32_t most_iterations;                 /* event iterations at one instant */
     int32_t version;                         /* 2 or 3, of FMI */
@@ -96,6 +107,7 @@ typedef struct {
     double time, next_event; /* s; next_event may be infinite */
     void *context, *solver, *vector, *tolerances, *matrix, *linear, *point_vector;
     int32_t has_begun, in_event_mode, ends, begins_anew, inputs_changed, nominals_changed;
+    int32_t gives_forces; /* some force input is not 0 */
     int32_t meets; /* the last step has ended where a contact point meets its surface */
     int32_t function, reason, solver_flag; /* of the last error */
     int32_t cause;   /* function at whose answer CVODE took a shorter step; -1: none */
@@ -117,7 +129,9 @@ int vi_exchange_call(vi_exchange *exchange, int function);
 int vi_exchange_get_numbers(vi_exchange *exchange, int function, double numbers[], int64_t count);
 /* Read the watched variables at the present point of the FMU. */
 int vi_exchange_read_watched(vi_exchange *exchange);
-/* Let the FMU have these states at `time`, in continuous-time mode; the integration stays where it is. */
-VI_DOOR int vi_door_exchange_show(vi_exchange *exchange, double time, const double states[]);
+/* Put the states that CVODE's last step passed at `time` into `point`. */
+int vi_exchange_move_point(vi_exchange *exchange, double time);
+/* Let the FMU have these states at `time`, in continuous-time mode, with its present inputs. */
+int vi_exchange_set_point(vi_exchange *exchange, double time, const double states[]);
 
 #endif

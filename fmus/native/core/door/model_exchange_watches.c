@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "door/model_exchange_forces.h"
+
 enum { OK = VI_EXCHANGE_OK, ERROR = VI_EXCHANGE_ERROR };
 
 /* Most halvings of a step of CVODE in search of the first meeting; then its ends are neighbouring numbers. */
@@ -27,6 +29,8 @@ int vi_exchange_mark_watches(vi_exchange *e)
     const int status = vi_exchange_read_watched(e);
     for (int64_t k = 0; status == OK && k < e->watch_count; k++) {
         vi_exchange_watch *watch = &e->watches[k];
+        watch->largest = 0.0;
+        watch->was_pressed = watch->is_pressed;
         if (is_contact(watch)) {
             const double now = distance(e, watch);
             watch->level = now > watch->room ? 0.0 : fmin(now, 0.0) - fmax(watch->room, DBL_MIN);
@@ -58,7 +62,9 @@ void vi_exchange_watch_roots(const vi_exchange *e, double roots[])
         roots[2 * k] = roots[2 * k + 1] = 1.0;
         if (watch->is_armed) {
             roots[2 * k] = distance(e, watch) - watch->level;
-            if (is_contact(watch)) { /* never 0, at which CVODE finds roots without end */
+            if (watch->is_pressed) {
+                roots[2 * k] = vi_exchange_stop_force(e, watch);
+            } else if (is_contact(watch)) { /* never 0, at which CVODE finds roots without end */
                 const double closing = -watch->factor * e->values[watch->rate];
                 roots[2 * k + 1] = closing != 0.0 ? closing : -DBL_MIN;
             }
@@ -69,27 +75,36 @@ void vi_exchange_watch_roots(const vi_exchange *e, double roots[])
 /* The smallest distance of all contact points from their levels, at a point of the FMU. */
 static int nearest(vi_exchange *e, double time, const double states[], double *smallest)
 {
-    int status = vi_door_exchange_show(e, time, states);
+    int status = vi_exchange_set_point(e, time, states);
     status = status != OK ? status : vi_exchange_read_watched(e);
     *smallest = INFINITY;
     for (int64_t k = 0; status == OK && k < e->watch_count; k++) {
         const vi_exchange_watch *watch = &e->watches[k];
-        if (watch->is_armed && is_contact(watch)) {
+        if (watch->is_armed && is_contact(watch) && !watch->is_pressed) {
             *smallest = fmin(*smallest, distance(e, watch) - watch->level);
         }
     }
     return status;
 }
 
-static int move_point(vi_exchange *e, double time)
+/* Let the contact points that are at their levels be the roots, by the last values that were read. */
+static void mark_met(vi_exchange *e)
 {
-    const int flag = e->cvode->motion(e->solver, time, 0, e->point_vector);
-    if (flag != 0) {
-        e->solver_flag = flag;
-        e->reason = VI_EXCHANGE_SOLVER;
-        return ERROR;
+    for (int64_t k = 0; k < e->watch_count; k++) {
+        const vi_exchange_watch *watch = &e->watches[k];
+        const bool takes_part = watch->is_armed && is_contact(watch) && !watch->is_pressed;
+        e->roots[e->indicator_count + 2 * k] = takes_part && distance(e, watch) <= watch->level ? -1 : 0;
     }
-    return OK;
+}
+
+void vi_exchange_change_contacts(vi_exchange *e)
+{
+    for (int64_t k = 0; k < e->watch_count; k++) {
+        vi_exchange_watch *watch = &e->watches[k];
+        if (e->roots[e->indicator_count + 2 * k] != 0 && is_contact(watch) && vi_contact_law_yields(watch->law.law)) {
+            watch->is_pressed = !watch->is_pressed;
+        }
+    }
 }
 
 /* A motion that has turned at the present point was nearer there than before: end the step at the meeting, if any. */
@@ -105,19 +120,21 @@ static int search_meeting(vi_exchange *e, double before, bool *event)
         if (!(near < middle && middle < far)) {
             break;
         }
-        status = move_point(e, middle);
+        status = vi_exchange_move_point(e, middle);
         status = status != OK ? status : nearest(e, middle, e->point, &smallest);
         if (status != OK) {
             return status;
         }
         *(smallest > 0.0 ? &near : &far) = middle;
     }
-    status = move_point(e, far);
+    status = vi_exchange_move_point(e, far);
+    status = status != OK ? status : nearest(e, far, e->point, &smallest);
     if (status == OK) {
         memcpy(e->states, e->point, sizeof(double) * (size_t)e->state_count);
         e->time = far;
         *event = false;
         e->meets = 1;
+        mark_met(e);
     }
     return status;
 }
@@ -155,7 +172,7 @@ int vi_exchange_keep_samples(vi_exchange *e, bool by_solver)
         if (count == 0) {
             continue;
         }
-        const int status = by_solver ? move_point(e, e->instants[e->sample_count]) : OK;
+        const int status = by_solver ? vi_exchange_move_point(e, e->instants[e->sample_count]) : OK;
         if (status != OK) {
             return status;
         }

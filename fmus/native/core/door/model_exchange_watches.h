@@ -14,6 +14,8 @@ void vi_exchange_watch_roots(const vi_exchange *exchange, double roots[]);
 /* Judge the roots at the end of a step of CVODE from `before`, s: `event` becomes whether one is an event. Where a
  * contact point met its surface, the step ends there. */
 int vi_exchange_judge_roots(vi_exchange *exchange, double before, bool *event);
+/* Let the roots of the last step begin and end the forces of stops that yield. */
+void vi_exchange_change_contacts(vi_exchange *exchange);
 /* Forget the touching of contact points that have moved away. */
 int vi_exchange_follow_watches(vi_exchange *exchange);
 /* Keep the states at the instants up to the present time; `by_solver`: CVODE has made the step, else they are constant. */

@@ -366,9 +366,9 @@ def test_a_scene_with_a_contact_in_model_exchange_runs_and_records_its_impacts(f
     record = None
     for force in ("", 'force = "u"\n'):
         scene = parse_scene(text + CONTACT + force, str(folder / "scene.toml"))
-        assert ("impulses on its states" if force else "impacts set its velocity") in contacts(scene)[
-            "contact[1]"
-        ]
+        assert ("impulses and forces on its states" if force else "impacts set its velocity") in contacts(
+            scene
+        )["contact[1]"]
         runner = GeneralRunner(scene)
         record = runner.run({})
         runner.close()
