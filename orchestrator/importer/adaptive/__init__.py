@@ -1,4 +1,4 @@
 """Communication steps that follow an error estimate: the estimate, the controller of the size, and the driver.
 
-docs/coupling.md has the method, docs/equations.md 6.16 its formulas.
+docs/coupling.md has the method, docs/equations.md 6.19 its formulas.
 """

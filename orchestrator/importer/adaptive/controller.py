@@ -10,7 +10,7 @@ SAFETY = 0.9
 PRESENT, LAST = 0.7, 0.4
 #: Least and largest ratio of two sizes in a row. A growth of at most 2 shows a fast motion before a step skips it.
 MOST_SHRINKING, MOST_GROWTH = 0.2, 2.0
-#: Error over the tolerance below which the error counts as this: a smaller one, as the last, would shorten the next step.
+#: Least error over the tolerance that counts: a smaller last error would shorten the next step.
 LEAST_ERROR = 1e-2
 #: First size after an event, over the size that errors have last chosen.
 AFTER_EVENT = 0.1
