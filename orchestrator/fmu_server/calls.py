@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
 from functools import partial
 from typing import Any
@@ -74,11 +74,9 @@ class ServedInstance:
             f"Free{word}": self._free_state,
         }
         if self._is_3:
-            self._others |= {
-                "GetClock": partial(self._clock, c_bool),
-                "GetIntervalDecimal": partial(self._clock, c_double, c_int),
-                "GetShiftDecimal": partial(self._clock, c_double),
-            }
+            self._others["GetClock"] = partial(self._clock, (c_bool,))
+            self._others["GetIntervalDecimal"] = partial(self._clock, (c_double, c_int))
+            self._others["GetShiftDecimal"] = partial(self._clock, (c_double,))
 
     def answer(self, data: bytes) -> tuple[bytes, bool]:
         """Make the calls of a batch up to the first that fails; return the answer, and whether others may follow."""
@@ -213,8 +211,7 @@ class ServedInstance:
         places = ((c_uint32 * max(1, count))(*call.references), c_size_t(count))
         return Result(status=self._call(call, *places, ticks))
 
-    def _clock(self, *kinds_and_call: Any) -> Any:
-        *kinds, call = kinds_and_call
+    def _clock(self, kinds: Sequence[Any], call: Any) -> Any:
         if len(call.references) != 1:
             raise Refused(f"{call.function}: expected one clock, got {len(call.references)}.")
         results = [kind(math.nan if kind is c_double else 0) for kind in kinds]

@@ -47,21 +47,15 @@ def results(folder: Path, fmu: str, more: str = "") -> tuple[dict[str, bytes], s
         return {str(name): data for name, data in numbers.items()}, str(runs.attrs["fmu_hashes"])
 
 
-@pytest.mark.parametrize("tls", [False, True], ids=["plain", "TLS"])
 def test_a_served_fmu_gives_the_results_of_its_file_and_ctrl_c_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tls: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    file = fmu_factory.faulty(tmp_path)
-    options, more = [], ""
-    if tls:
-        made = certificate()
-        (tmp_path / "own.pem").write_bytes(made.certificate)
-        (tmp_path / "own.key").write_bytes(made.key)
-        options, more = (
-            ["--certificate", tmp_path / "own.pem", "--key", tmp_path / "own.key"],
-            'certificate = "own.pem"',
-        )
+    file, made = fmu_factory.faulty(tmp_path), certificate()
+    (tmp_path / "own.pem").write_bytes(made.certificate)
+    (tmp_path / "own.key").write_bytes(made.key)
+    options = ["--certificate", tmp_path / "own.pem", "--key", tmp_path / "own.key"]
+    more = 'certificate = "own.pem"'
     token = tmp_path / "token"
     given = ["fmu", "serve", file, "--listen", "127.0.0.1:0", "--token-file", token]
     with warm.start(ENTRY, *given, *options, env=dict(os.environ)) as server:
