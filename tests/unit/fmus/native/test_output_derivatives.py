@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
-from support.component_fmu import HUNT_CROSSLEY, KELVIN_VOIGT, RESTITUTION, VERSIONS, ComponentFmu, forced, stop
+from support.component_fmu import (
+    HUNT_CROSSLEY,
+    KELVIN_VOIGT,
+    RESTITUTION,
+    VERSIONS,
+    ComponentFmu,
+    forced,
+    stop,
+)
 
 from vibroimpact.fmus import fmu_path
 
