@@ -213,7 +213,8 @@ def test_derivatives_pass_chatter_rest_and_release(followed: Callable[..., Path]
     rests, leaves = 4.0, 7.5
     with ComponentFmu(followed("Oscillator"), given) as it:
         it.advance(rests)
-        assert it.get("contact[1].stuck") and it.get("contact[1].count") > 10
+        assert it.get("contact[1].stuck")
+        assert it.get("contact[1].count") > 10
         assert it.get("sensitivity.displacement.contact[1].position") == pytest.approx(1.0, abs=1e-13)
         assert abs(it.get("sensitivity.velocity.mass")) <= 1e-13
         assert it.get("sensitivity.contact[1].force.contact[1].position") == pytest.approx(-1.0, abs=1e-12)
