@@ -63,7 +63,7 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
     watched = _watched(scene, place)
     with open_scene(watched) as runner:
         record = runner.record_of(place.point.values, place.start if place.first else start)
-    names = watched.sampled
+    names = watched.plain_samples
     motion = {
         "samples": _samples(record, names),
         "impacts": _columns(record.impacts, IMPACT_COLUMNS),
@@ -185,6 +185,10 @@ def _left_out(scene: Scene, watched: Scene, record: RunRecord) -> list[str]:
     samples = 0 if record.samples is None else len(record.samples)
     if samples > MOST_SAMPLES:
         found.append(f"One of {_every(samples)} of {samples} samples is drawn.")
+    if watched.sample_forms:
+        found.append(
+            f"Arrays, texts, enumerations and long integers are not drawn: {', '.join(watched.sample_forms)}."
+        )
     for words, rows in (("impacts", record.impacts), ("periods", record.periods)):
         if rows is not None and len(rows) > MOST_SAMPLES:
             found.append(f"The first {MOST_SAMPLES} of {len(rows)} {words} are shown.")

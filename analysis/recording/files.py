@@ -359,7 +359,7 @@ def _run_signals(flat: Any, row: int, title: str) -> Recording:
         events["impacts"] = EventTrain("impacts", known["impact_time"], label="impacts", attrs=known)
     if not channels and not events:
         raise DatasetError(
-            f"{title}: expected a run with time series or impacts, got neither. "
+            f"{title}: expected a run with time series of single numbers or impacts, got neither. "
             "Ask for them under [record] in the scene."
         )
     attrs = {**flat.attrs, "opened_from": title, "simulated": 1}

@@ -28,11 +28,12 @@ def dimensions_of(variables: Mapping[str, ModelVariable]) -> dict[str, Dimension
 
 
 def default_sizes(variables: Mapping[str, ModelVariable]) -> dict[str, int]:
-    """Return the start values of the structural parameters."""
+    """Return the start values of the structural parameters, and of other variables that are sizes (constants)."""
+    sizes = {name for each in dimensions_of(variables).values() for name in each if isinstance(name, str)}
     return {
         name: int(variable.start)
         for name, variable in variables.items()
-        if variable.causality == STRUCTURAL and variable.start is not None
+        if variable.start is not None and (variable.causality == STRUCTURAL or name in sizes)
     }
 
 

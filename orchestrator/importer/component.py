@@ -483,7 +483,7 @@ def _loses_memory(description: ModelDescription) -> bool:
 def _shapes(variables: Mapping[str, ModelVariable], parameters: Mapping[str, Value]) -> dict[str, Shape]:
     """Return the shape of each array where some structural parameters have start values."""
     sizes = default_sizes(variables)
-    sizes |= {name: v for name, v in parameters.items() if name in sizes and isinstance(v, int)}
+    sizes |= {name: value for name, value in parameters.items() if name in sizes and isinstance(value, int)}
     return {name: shape_of(dimensions, sizes) for name, dimensions in dimensions_of(variables).items()}
 
 

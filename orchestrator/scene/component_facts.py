@@ -119,7 +119,7 @@ class ComponentFacts:
     capabilities : Capabilities
         Declared capabilities of the kind that runs.
     sizes : mapping of str to int
-        Start values of the structural parameters.
+        Start values of the structural parameters, and of constants that are sizes.
     doubts : tuple of str
         Open points of the description, each with the assumption.
     remarks : int

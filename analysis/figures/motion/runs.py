@@ -16,6 +16,7 @@ from vibroimpact.analysis.figures.motion.layers import draw_turns
 from vibroimpact.analysis.figures.motion.series import (
     count_time,
     draw_series,
+    left_out,
     sampled_variables,
     selected,
     time_part,
@@ -67,7 +68,8 @@ def draw_run(dataset: xr.Dataset, view: View) -> Figure:
     if "displacement_max" in dataset.variables or "impact_velocity" in dataset.variables:
         return _draw_periods(dataset, view.run)
     raise DatasetError(
-        "figure: expected a time series, extrema or impacts of the run, got none recorded. "
+        f"figure: expected a time series of single numbers, extrema or impacts of the run, got none recorded"
+        f"{left_out(dataset)}. "
         'Set time_series = { rate = ..., variables = ["displacement", "velocity"] } in [record], '
         "or rate and variables in a scene of components."
     )

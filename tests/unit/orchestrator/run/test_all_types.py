@@ -17,7 +17,7 @@ from support.serial_pool import workers_here
 import vibroimpact as vi
 from vibroimpact.analysis.dataset.stores.converting import convert
 from vibroimpact.analysis.dataset.stores.runs import read_runs
-from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign, schedule
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import export_system
@@ -286,6 +286,8 @@ def test_a_figure_says_which_variables_it_leaves_out(folder: Path, tmp_path: Pat
     made = vi.run(scene(folder, {}, ["word", "x", "big"]))
     (axis,) = made.vibroimpact.samples().pipe(lambda _: vi.draw(made)).axes
     assert axis.get_xlabel().endswith(", without c_word, c_x (arrays, texts)")
+    with pytest.raises(DatasetError, match=r"got none recorded, without c_word, c_x \(arrays, texts\)"):
+        vi.draw(vi.run(scene(folder, {}, ["word", "x"])))
 
 
 def test_arrays_have_no_form_in_an_exported_system(folder: Path, tmp_path: Path) -> None:
