@@ -122,6 +122,12 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
             if interface.get("modelIdentifier") == fmu.identifiers[0]
         ],
         "resources": str(fmu.resources),
+        "restorable": any(
+            interface.get(f"canGetAndSetFMU{word}") in ("true", "1")
+            for tag in INTERFACES
+            for interface in root.findall(tag)
+            for word in ("state", "State")
+        ),
         # PythonFMU's binary is the same for all its FMUs, and ignores the token
         "any_token": root.get("generationTool", "").startswith("PythonFMU"),
     }

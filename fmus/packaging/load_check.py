@@ -26,8 +26,10 @@ WRONG_TOKEN = "{not the token of any model}"
 NEEDED = {
     *("Instantiate", "InstantiateCoSimulation", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
     *("ExitInitializationMode", "Terminate", "Reset", "DoStep", "EnterEventMode", "EnterStepMode"),
-    *("UpdateDiscreteStates", "GetFMUstate", "SetFMUstate", "GetFMUState", "SetFMUState"),
+    "UpdateDiscreteStates",
 }
+#: Functions that it needs for an FMU with canGetAndSetFMUState.
+NEEDED_FOR_STATES = {"GetFMUstate", "SetFMUstate", "GetFMUState", "SetFMUState"}
 CO_SIMULATION_INTERFACE = "CoSimulation"
 REFUSED, REMARK = "refused", "remark"
 
@@ -54,8 +56,8 @@ class Fmi2Callbacks(Structure):
 def problems_of(facts: dict[str, Any]) -> list[Found]:
     """Return the problems of a binary, each with the name of its grade and a line.
 
-    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder), and
-    `any_token` (whether the binary is known to accept every token).
+    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder),
+    `restorable` (canGetAndSetFMUState), and `any_token` (whether the binary is known to accept every token).
     """
     name = Path(facts["binary"]).name
     try:
@@ -77,7 +79,8 @@ def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[Fou
     if missing:
         version = facts["fmi_version"]
         # an FMU runs without functions that this importer never calls
-        needed = runs and any(function[len("fmi2") :] in NEEDED for function in missing)
+        called = NEEDED | (NEEDED_FOR_STATES if facts["restorable"] else set())
+        needed = runs and any(function[len("fmi2") :] in called for function in missing)
         text = f"{name}: expected all functions of FMI {version}, got none called {', '.join(missing)}."
         yield REFUSED if needed else REMARK, text
         if needed or not hasattr(library, instantiating_function(facts)):

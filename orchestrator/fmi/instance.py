@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.library import Function, Library
 from vibroimpact.orchestrator.fmi.log import LogTail
@@ -104,6 +104,8 @@ class Instance(ABC):
     runs_here: ClassVar[bool] = True
     """Its functions run in this process, so that C code can call them."""
     group_type: ClassVar[type[VariableGroup]] = VariableGroup
+    lacks_states: ComponentFileError | None = None
+    """The error of a binary without functions of states, None if it has them."""
 
     def __init__(
         self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
@@ -383,8 +385,12 @@ class Instance(ABC):
     # ---- states ----
 
     def _bind_states(self) -> None:
-        self._get_state = self._function(f"Get{self.state_word}")
-        self._set_state = self._function(f"Set{self.state_word}")
+        """Bind the functions of states, which an FMU that declares no states may lack."""
+        try:
+            self._get_state = self._function(f"Get{self.state_word}")
+            self._set_state = self._function(f"Set{self.state_word}")
+        except ComponentFileError as error:
+            self.lacks_states = error
         self._free_state = f"Free{self.state_word}"
 
     def free_state(self, slot: c_void_p) -> None:

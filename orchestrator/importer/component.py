@@ -140,6 +140,8 @@ class Component:
             self.instance = self._instance3(fmu, log, wrap)
         else:
             self.instance = self._instance2(fmu, log, wrap, _loses_memory(description))
+        if self.has_states and self.instance.lacks_states is not None:
+            raise self.instance.lacks_states
         self.instance.internal_step = self.capabilities.internal_step
         if self.capabilities.clocks and not self.event_mode:
             raise self._clocks_error()

@@ -14,13 +14,13 @@ from fmpy import read_model_description, simulate_fmu
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.dataset.naming import file_names
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.model_description import Grade
 from vibroimpact.orchestrator.running import run_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.component_facts import NUMERIC_KINDS, component_facts
-from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.ssp import load_system
 from vibroimpact.orchestrator.ssp.importing import Imported
 
@@ -71,7 +71,8 @@ def ours(path: Path) -> Facts:
     if not variables:
         return {"time": np.array([]), "values": {}}
     samples = data.vibroimpact.samples()
-    values = {name: samples[f"x_{dataset_name(name)}"].values for name in plan["outputs"]}
+    stored = zip(plan["outputs"], file_names(variables), strict=True)
+    values = {name: samples[in_file].values for name, in_file in stored}
     return {"time": samples.time.values, "values": values}
 
 

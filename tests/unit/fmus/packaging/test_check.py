@@ -128,6 +128,21 @@ def test_a_function_that_each_run_calls_is_a_refusal(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("declared", [True, False])
+def test_functions_of_states_are_needed_by_an_fmu_that_declares_states(
+    tmp_path: Path, declared: bool
+) -> None:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        if name == "modelDescription.xml" and not declared:
+            return name, content.replace(b'canGetAndSetFMUstate="true"', b'canGetAndSetFMUstate="false"')
+        renamed = content.replace(b"\0fmi2GetFMUstate\0", b"\0fmi2GetFMUstatx\0")
+        return name, renamed if name.startswith("binaries/") else content
+
+    (problem,) = check_fmu(changed(fmu_path("Gain", "2.0"), tmp_path / "G.fmu", change))
+    assert "got none called fmi2GetFMUstate." in problem.text
+    assert problem.grade is (Grade.refused if declared else Grade.remark)
+
+
 def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path) -> None:
     path = tmp_path / "O.fmu"
     path.write_bytes(b"nothing")

@@ -10,6 +10,7 @@ from support import fmu_factory
 from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi import rounding
@@ -393,3 +394,41 @@ def test_a_tolerance_that_is_none_is_refused(folder: Path, value: str) -> None:
     text = TOLERANT.format(major="3", tolerance=f"tolerance = {value}", guard="false")
     with pytest.raises(SceneError, match=r"component\.ball\.tolerance: expected .*got"):
         parse_scene(text, str(folder / "scene.toml"))
+
+
+# ---- FMUs without functions of states ----
+
+LACKING = """
+[component.g]
+fmu = "lacking.fmu"
+parameters = { gain = 3.0, input = 2.0 }
+[record]
+recorded_time = 1.0
+rate = 10
+variables = ["g.output"]
+[execution]
+guard = false
+"""
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_an_fmu_without_functions_of_states_runs_unless_it_declares_states(
+    tmp_path: Path, declared: bool
+) -> None:
+    """HIFSuite's FMUs lack these functions, and their descriptions say so."""
+    flag = b'canGetAndSetFMUstate="%s"'
+    with (
+        zipfile.ZipFile(fmu_path("Gain", "2.0")) as source,
+        zipfile.ZipFile(tmp_path / "lacking.fmu", "w") as lacking,
+    ):
+        for name in source.namelist():
+            content = source.read(name).replace(b"\0fmi2GetFMUstate\0", b"\0fmi2GetFMUstatx\0")
+            if name == "modelDescription.xml":
+                assert flag % b"true" in content
+                content = content.replace(flag % b"true", flag % (b"true" if declared else b"false"))
+            lacking.writestr(name, content)
+    if declared:
+        with pytest.raises(ComponentFileError, match="exports fmi2GetFMUstate, got one without it"):
+            run(LACKING, tmp_path)
+    else:
+        assert run(LACKING, tmp_path).samples[-1, 1] == 6.0
