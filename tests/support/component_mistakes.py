@@ -87,7 +87,7 @@ OF_COMPONENTS = [
     (
         '"b.displacement"',
         '"a.record.rows"',
-        "connection[1].from: expected a number, or true or false, got the array of Float64 a.record.rows.",
+        "connection[1]: expected two variables of one shape, got 512 x 8 (a.record.rows) to a single value (a.force).",
     ),
     ("mass = 2", "mass = nan", "component.a.parameters.mass: expected a finite number >= 0, got nan."),
     ("mass = 2", "mass = true", "component.a.parameters.mass: expected a finite number >= 0, got true."),

@@ -158,7 +158,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
     "two numbers for one": (ssd(part(bindings=values({"mass": real(1.0) + real(2.0)}))), "got Real, Real"),
     "a step of no time": (
         ssd(TWO, connection("a.displacement", "b.force", factor(1.0)), step=0.0),
-        "macro_step: expected a number > 0, got 0.0",
+        'macro_step: expected a number > 0, or "auto", got 0.0',
     ),
     "an array": (ssd(part(bindings=values({"mass": real(1.0).replace("1.0", "1 2")}))), "finite number"),
     "a value out of range": (ssd(part(bindings=values({"mass": real(-1.0)}))), "got -1"),
