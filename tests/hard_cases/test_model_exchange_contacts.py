@@ -30,8 +30,10 @@ from support.exchanged_parts import (
 )
 from support.pair_parts import hit
 
+from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
+from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.importer.specification import (
     BodyPoint,
@@ -441,6 +443,28 @@ def test_two_stops_press_one_force_input_and_samples_show_their_forces(folder: P
             assert (upper > 0.0).sum() > 100
         run.importer.free()
     assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("law", ["restitution", "hunt_crossley"])
+@fmi_versions
+def test_our_oscillator_at_a_stop_moves_as_with_its_own_contact(fmi: str, law: str) -> None:
+    body = {"mass": 2.0, "stiffness": 800.0, "damping": 0.4, "forcing.amplitude": 10.0}
+    body["forcing.angular_frequency"] = 18.0
+    stop = {"law": law, "position": 0.02, "restitution": 0.8, "stiffness": 1e7, "damping": 0.3}
+    own = {**body, **{f"contact[1].{name}": value for name, value in stop.items()}}
+    fused = Importer([ComponentSpec("o", fmu_path("Oscillator", fmi), own)], macro_step=0.1)
+    fused.begin()
+    fused.advance(5.0)
+    exact = values(fused, "o", "displacement", "velocity")
+    fused.free()
+    parts = [
+        ComponentSpec("m", fmu_path("Oscillator", fmi), body, 1e-10, "model_exchange"),
+        ComponentSpec("s", fmu_path("ImpactStop", fmi), stop),
+    ]
+    run = run_of(parts, [contact("force", ("displacement", "velocity"))]).at(5.0)
+    assert run.motion("displacement", "velocity") == pytest.approx(exact, rel=0.0, abs=1e-8)
+    assert len(run.impacts) > 5
+    run.importer.free()
 
 
 @fmi_versions

@@ -17,7 +17,7 @@ TOUCHING = 1e-14
 #: Trial force, N: a displacement or a velocity that follows it at once does not depend on the states alone.
 TRIAL_FORCE = 1.0
 #: Parameters of the stop's law, as an ImpactStop names them.
-NUMBERS = ("restitution", "yield_velocity", "stiffness", "damping", "exponent")
+NUMBERS = ("stiffness", "damping", "exponent")
 
 
 class LawBond:
@@ -105,6 +105,8 @@ def law_bond_of(bond: HeldForceBond) -> LawBond | None:
     """Return a bond whose force belongs to the derivatives; None for another body or stop of this run."""
     stop = bond.stop
     if bond.watch is None or bond.contact.force is None or stop.law not in _own_yielding_laws():
+        return None
+    if stop.surface is None or not set(NUMBERS) <= set(stop.component.variables):
         return None
     return LawBond(bond, bond.watch)
 
