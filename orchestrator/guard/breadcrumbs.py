@@ -31,6 +31,7 @@ LOADING = "loading"
 #: FMI's functions, by the methods of an instance that call them.
 METHODS = {
     "step": "DoStep",
+    "_awaited": "DoStep",
     "_instantiate": "Instantiate",
     "enter_initialization": "EnterInitializationMode",
     "exit_initialization": "ExitInitializationMode",
@@ -40,7 +41,9 @@ METHODS = {
     "save": "GetFMUState",
     "restore": "SetFMUState",
     "set_clocks": "SetClock",
-    "clock_times": "GetIntervalDecimal",
+    "has_ticked": "GetClock",
+    "clock_interval": "GetIntervalDecimal",
+    "clock_shift": "GetShiftDecimal",
     "directional_derivative": "GetDirectionalDerivative",
 }
 

@@ -253,6 +253,7 @@ static step_answer misbehave(model *m, double time, void *instance)
         m->value[Y] = NAN;
         break;
     case FAULT_PENDING:
+        m->says_early = m->value[SAYS_EARLY] > 0.0;
         return STEP_PENDS;
     case FAULT_TERMINATE:
         return STEP_TERMINATES;

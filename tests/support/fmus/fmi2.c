@@ -1,5 +1,6 @@
 /* FMI 2.0 co-simulation of the model that it is compiled with. Strict about common mistakes of importers: the
  * communication point must be the FMU's own time, and steps go forward. */
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -326,7 +327,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     case STEP_FATAL:
         return fmi2Fatal;
     case STEP_PENDS:
-        of(c)->pending = 3;
+        of(c)->pending = m->says_early ? INT_MAX : 3; /* it never ends, or soon */
         of(c)->goal = time + size;
         return fmi2Pending;
     case STEP_STALLS:

@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopContactSpec
 from vibroimpact.orchestrator.run.general import GeneralRunner
+from vibroimpact.orchestrator.running import open_scene
 from vibroimpact.orchestrator.scene import parse_scene
 
 VERSIONS = ("2.0", "3.0")
@@ -377,6 +378,20 @@ def test_a_step_that_goes_on_by_itself_is_waited_for(folder: Path, steps_in_c: b
     with pytest.raises(ComponentError, match=r"fmi2DoStep returned pending, .*without canRunAsynchronuously"):
         silent.advance(1.0)
     silent.free()
+
+
+def test_a_step_that_never_ends_is_the_time_out_of_its_component(folder: Path) -> None:
+    flag = ("<CoSimulation ", '<CoSimulation canRunAsynchronuously="true" ')
+    fmu = described(folder, "Faulty.fmi2.fmu", flag)
+    text = (
+        f'[component.a]\nfmu = "{fmu}"\nparameters = {{ fault = "pending", fault_time = 0.35, says_early = 1 }}\n'
+        "[record]\nrecorded_time = 1.0\n[execution]\nmacro_step = 0.1\nguard = true\ndeadline = 0.5\n"
+    )
+    runner = open_scene(parse_scene(text, str(folder / "scene.toml")))
+    record = runner.run({})
+    runner.close()
+    assert record.outcome is Outcome.timeout
+    assert record.message.startswith("a: fmi2DoStep at time 0.3")
 
 
 # ---- refused ----
