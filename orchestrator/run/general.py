@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
-from vibroimpact.orchestrator.importer.adaptive.aliasing import SampledRates
+from vibroimpact.orchestrator.importer.aliasing import SampledRates
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.contact_impacts import ContactImpacts, impact_rows
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy

@@ -13,9 +13,9 @@ from support import fmu_factory
 from support.coupled_parts import EXCHANGES, body, contact, events_of, external, link, part, stop, values
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.importer.adaptive.aliasing import SampledRates
 from vibroimpact.orchestrator.importer.adaptive.controller import StepController
 from vibroimpact.orchestrator.importer.adaptive.record import StepRecord
+from vibroimpact.orchestrator.importer.aliasing import SampledRates
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
