@@ -1,0 +1,146 @@
+"""Chosen communication steps where FMUs and motions are hard: jumps, chatter, loops, missing states, chaos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from support import fmu_factory
+from support.coupled_parts import body, contact, events_of, external, link, part, stop, values
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fmus")
+
+
+def oscillator(name: str, **parameters: float) -> ComponentSpec:
+    return body(name, {"mass": 1.0, "stiffness": 1.0, **parameters})
+
+
+def chosen(
+    parts: Sequence[ComponentSpec],
+    links: Sequence[ConnectionSpec],
+    events: Sequence[EventSpec] = (),
+    tolerance: float = 1e-4,
+) -> Importer:
+    importer = Importer(parts, links, events, macro_step="auto", coupling_tolerance=tolerance)
+    assert importer.adaptive is not None
+    return importer
+
+
+def test_a_watched_event_is_located_within_a_chosen_step(folder: Path) -> None:
+    ball = part("ball", fmu_factory.bouncing_ball(folder))
+    importer = chosen(
+        [ball, oscillator("b", displacement_start=1.0)],
+        [link("ball.v", "b.force", 0.1)],
+        [EventSpec("ball", "v", "rising")],
+    )
+    events = events_of(importer)
+    importer.begin()
+    importer.advance(0.6)
+    assert events[0].time == pytest.approx(math.sqrt(2.0 / 9.81), abs=1e-9)
+    importer.free()
+
+
+def test_chatter_beside_a_coupled_body_needs_few_steps() -> None:
+    driven = {"damping": 0.2, "forcing.amplitude": 1.0, "forcing.angular_frequency": 0.2, **external(0.2)}
+    parts = [body("b", driven), stop("s", 0.5), oscillator("c", displacement_start=1.0)]
+    links = [
+        *contact("b", "s"),
+        link("b.displacement", "c.force", 0.1),
+        link("c.displacement", "b.force", 0.05),
+    ]
+    importer = chosen(parts, links, tolerance=1e-3)
+    events = events_of(importer)
+    importer.begin()
+    importer.advance(12.0)
+    assert len(events) > 10
+    assert importer.steps < 1000
+    importer.free()
+
+
+@pytest.mark.parametrize("fault", [1, 3, 12])
+def test_a_fault_in_a_step_is_the_fault_of_its_component(folder: Path, fault: int) -> None:
+    faulty = part("f", fmu_factory.faulty(folder), fault=fault, fault_time=0.5)
+    importer = chosen(
+        [faulty, oscillator("b", displacement_start=1.0)],
+        [link("b.displacement", "f.u"), link("f.y", "b.force")],
+        tolerance=1e-2,
+    )
+    importer.begin()
+    with pytest.raises(ComponentError, match=r"f: fmi3DoStep"):
+        importer.advance(1.0)
+    importer.free()
+
+
+def test_a_component_ends_the_run_within_a_step_on_trial(folder: Path) -> None:
+    ending = part("f", fmu_factory.faulty(folder), fault=11, fault_time=0.5)
+    importer = chosen(
+        [ending, oscillator("b", displacement_start=1.0)],
+        [link("b.displacement", "f.u"), link("f.y", "b.force")],
+        tolerance=1e-2,
+    )
+    importer.begin()
+    importer.advance(1.0)
+    assert importer.wants_to_end
+    assert 0.5 <= importer.time < 0.6
+    importer.free()
+
+
+def test_a_loop_is_consistent_at_the_ends_of_chosen_steps(folder: Path) -> None:
+    # y = u / 2 + w of two components in a circle, driven by a body
+    through = fmu_factory.feedthrough(folder)
+    parts = [
+        part("f", through, k=0.5, l=1.0),
+        part("g", through, k=0.5),
+        oscillator("b", displacement_start=1.0),
+    ]
+    links = [
+        link("f.y", "g.u"),
+        link("g.y", "f.u"),
+        link("b.displacement", "f.w"),
+        link("f.y", "b.force", -0.75),
+    ]
+    importer = chosen(parts, links)
+    importer.begin()
+    importer.advance(1.0)
+    # y = x / (1 - 1/4), so that the force is -x
+    assert values(importer, "b", "displacement")[0] == pytest.approx(math.cos(math.sqrt(2.0)), abs=5e-3)
+    assert importer.loops.residual <= 1e-12
+    importer.free()
+
+
+def test_components_without_states_are_never_taken_back(folder: Path) -> None:
+    stateless = fmu_factory.mass(folder, states=False)
+    parts = [part("m", stateless, m=1.0, k=1.0, load=1.0), part("n", stateless, m=1.0, k=1.0)]
+    importer = chosen(parts, [link("m.x", "n.f", 0.1), link("n.x", "m.f", 0.1)], tolerance=1e-3)
+    importer.begin()
+    importer.advance(1.2)
+    assert importer.adaptive is not None
+    assert importer.adaptive.record.rejected == 0
+    # symmetric and antisymmetric motion: (1 - cos(w t)) / (2 w^2) with w^2 = .9 and 1.1
+    slow, fast = ((1.0 - math.cos(math.sqrt(w) * 1.2)) / (2.0 * w) for w in (0.9, 1.1))
+    assert values(importer, "n", "x")[0] == pytest.approx(slow - fast, abs=3e-4)
+    importer.free()
+
+
+def test_model_exchange_is_taken_back_too() -> None:
+    parts = [
+        ComponentSpec(c.name, c.fmu, c.parameters, tolerance=1e-9, run_as="model_exchange")
+        for c in (oscillator("a", displacement_start=1.0), oscillator("b"))
+    ]
+    importer = chosen(parts, [link("b.displacement", "a.force", 0.1), link("a.displacement", "b.force", 0.1)])
+    importer.begin()
+    importer.advance(2.0)
+    slow, fast = math.sqrt(0.9), math.sqrt(1.1)
+    exact = 0.5 * (math.cos(2.0 * slow) + math.cos(2.0 * fast))
+    assert importer.adaptive is not None
+    assert abs(values(importer, "a", "displacement")[0] - exact) < importer.adaptive.record.error
+    importer.free()
