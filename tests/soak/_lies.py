@@ -134,7 +134,7 @@ SUBJECTS = {
     ),
     # it stops where a completed step lies beyond x = `at`
     "completed": Subject(
-        *(fmu_factory.exchanged, BOTH, MODEL_EXCHANGE, ("x", "v"), ({"kind": 3.0, "x": 0.1, "v": 1.0},)),
+        *(fmu_factory.exchanged, BOTH, MODEL_EXCHANGE, ("x",), ({"kind": 3.0, "x": 0.1, "v": 1.0},)),
         close=0.1,  # the solver's steps decide where it stops
         invisible=(("needsCompletedIntegratorStep", "false"), ("completedIntegratorStepNotNeeded", "true")),
     ),
@@ -257,9 +257,10 @@ def _outcome(tables: Tables, *, guarded: bool = False, again: bool = False) -> R
             runner.close()
     except VibroimpactError as error:
         return str(error)
-    same = first.samples is not None and second.samples is not None
-    same = same and first.samples.tobytes() == second.samples.tobytes()
-    return first if same or first.outcome is not Outcome.ok else "the second run differs from the first"
+    if first.samples is None or second.samples is None:
+        return first
+    same = first.samples.tobytes() == second.samples.tobytes()
+    return first if same else "the second run differs from the first"
 
 
 def _judged(

@@ -136,7 +136,9 @@ def _point(runner: Runner, fault: int, slope: float) -> str | None:
     if not fault:
         return f"an innocent point is lost: {record.outcome.name}: {record.message}"
     # a fault that attacks its process or others may strike during the call of another component
-    blamed = ("culprit", "bystander", "guard: ") if fault in AT_A_DISTANCE else ("culprit", "guard: ")
+    blamed: tuple[str, ...] = (
+        ("culprit", "bystander", "guard: ") if fault in AT_A_DISTANCE else ("culprit", "guard: ")
+    )
     if fault in FLOODS:  # each call returns: the deadline may pass between two of them
         blamed += ("deadline: ",)
     named = record.message.startswith(blamed)

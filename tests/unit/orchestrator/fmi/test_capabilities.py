@@ -231,7 +231,9 @@ def test_an_early_return_counts_whether_it_was_announced_or_not(folder: Path) ->
     importer = Importer([part("ball", ball)], macro_step=0.01)
     importer.steps_in_c = False
     importer.begin()
-    importer.components["ball"].instance.may_return_early = False  # the neglect: its early return is no end
+    instance = importer.components["ball"].instance
+    assert isinstance(instance, Instance3)
+    instance.may_return_early = False  # the neglect: its early return is no end
     with pytest.raises(ComponentError, match="since early return was not allowed"):
         importer.advance(1.0)
     importer.free()
