@@ -19,7 +19,7 @@ from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.safe_xml import root_of
 from vibroimpact.orchestrator.fmi.capabilities import CO_SIMULATION
 from vibroimpact.orchestrator.fmu_server.process import FmuProcess, ProcessEnded
-from vibroimpact.orchestrator.remote.address import SCHEME, Address
+from vibroimpact.orchestrator.remote.address import Address
 from vibroimpact.orchestrator.remote.channel import grpc
 from vibroimpact.orchestrator.remote.protocol import (
     DESCRIBE,
@@ -261,8 +261,3 @@ def served_fmu(file: Path) -> UnpackedFmu:
             "scene runs."
         )
     return fmu
-
-
-def written_address(server: Server) -> str:
-    """Return the address of a server as a scene names it."""
-    return f"{SCHEME}{server.address}"

@@ -7,14 +7,14 @@ along with the next batch of the same functions. So a step with its inputs and o
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.orchestrator.fmi.library import Function
-from vibroimpact.orchestrator.remote.protocol import CODES, SCALARS, STATE_WORDS, VALUES, Call
+from vibroimpact.orchestrator.remote.protocol import SCALARS, STATE_WORDS, VALUES, Call
 
 OK, WARNING = 0, 1
 #: Functions without results besides their status, which wait for the next call.
@@ -70,7 +70,7 @@ class RemoteFunctions:
     def named(self, name: str) -> Function:
         """Return a function; ComponentFileError if no importer here calls it."""
         if name in self._scalars:
-            return partial(self._call_scalars, name, *self._scalars[name])
+            return partial(self._call_scalars, name, self._scalars[name][0])
         verb, rest = name[:3], name[3:]
         if rest in self._values and verb in ("Get", "Set"):
             return partial(self._get if verb == "Get" else self._set, name, self._values[rest])
@@ -125,16 +125,13 @@ class RemoteFunctions:
 
     # ---- kinds of functions ----
 
-    def _call_scalars(self, name: str, given: str, returned: str, _: Any, *arguments: Any) -> int:
+    def _call_scalars(self, name: str, given: str, _: Any, *arguments: Any) -> int:
         call = Call(function=name, numbers=[argument.value for argument in arguments[: len(given)]])
         self._is_stepping = (self._is_stepping or name in STEPPING) and name not in NOT_STEPPING
         if name in WAITING:
             return self._later(call)
         result = self._now(call)
-        if result.numbers:
-            for code, place, number in zip(returned, arguments[len(given) :], result.numbers, strict=True):
-                place._obj.value = number if code == "d" else int(number)
-        return int(result.status)
+        return _taken(result, arguments[len(given) :])
 
     def _get(
         self, name: str, kind: Any, _: Any, places: Any, count: Any, address: Any, size: Any = None
@@ -185,10 +182,7 @@ class RemoteFunctions:
 
     def _ask_clock(self, name: str, _: Any, place: Any, count: Any, *results: Any) -> int:
         result = self._flushed([Call(function=name, references=_references(place, count))])
-        for reference, number in zip(results, result.numbers, strict=bool(result.numbers)):
-            kind = type(reference._obj)
-            reference._obj.value = number if kind is CODES["d"] else int(number)
-        return int(result.status)
+        return _taken(result, results)
 
     def _derivative(
         self, _: Any, unknowns: Any, count: Any, knowns: Any, one: Any, seed: Any, *rest: Any
@@ -224,6 +218,19 @@ class RemoteFunctions:
             self._waiting.append(Call(function=name, slot=slot._obj.value))
             slot._obj.value = None
         return OK
+
+
+def _taken(result: Any, places: Sequence[Any]) -> int:
+    """Write the numbers of a result to their places, and return its status; a failed call may have none."""
+    numbers = list(result.numbers)
+    if result.status <= WARNING or numbers:
+        kinds = [type(place._obj) for place in places]
+        whole = [number for kind, number in zip(kinds, numbers, strict=False) if kind is not ctypes.c_double]
+        if len(numbers) != len(places) or not all(abs(number) < 2.0**31 for number in whole):
+            raise ComponentFileError(f"an answer of a server: expected {len(places)} numbers, got others.")
+        for kind, place, number in zip(kinds, places, numbers, strict=True):
+            place._obj.value = number if kind is ctypes.c_double else int(number)
+    return int(result.status)
 
 
 def _references(places: Any, count: Any) -> list[int]:

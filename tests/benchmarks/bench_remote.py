@@ -1,7 +1,7 @@
 """Time of a step of an FMU on a server of this machine, without TLS and with it, beside the same FMU in this process.
 
 Two oscillators exchange displacements at each step; one of them is served. A step carries its inputs, the step and the
-outputs in one message there and one back. The figure is the median of many steps; its goal is 1 ms on a machine that is
+outputs in one message there and one back. The figure is the median of many steps. Its goal is 1 ms on a machine that is
 otherwise idle: a message wakes four threads in three processes, one after the other.
 
 Run with `python tests/benchmarks/bench_remote.py [--steps 2000]`.
