@@ -131,7 +131,7 @@ def check(
     step: float = 1e-5,
     version: str = "3.0",
 ) -> list[int]:
-    """Compare derivatives with Richardson's differences of runs; return the counts of both contacts."""
+    """Compare derivatives with differences of runs; return the counts of both contacts."""
     values, counts = outputs_at(
         fmu, given, ends, [f"sensitivity.{name}.{key}" for key in keys for name in names], version
     )
@@ -141,12 +141,11 @@ def check(
     for key in keys:
         own, runs = key.replace("stop[", "contact["), {}
         size = step * max(abs(begun[key]), 0.1)
-        for place in (-2, -1, 1, 2):
+        for place in (-1, 1):
             changed = {**given, own: begun[key] + place * size}
             runs[place], other = outputs_at(fmu, changed, ends, names, version)
             assert other == counts
-        whole, half = ((np.array(runs[n]) - np.array(runs[-n])) / (2.0 * n * size) for n in (2, 1))
-        expected = (4.0 * half - whole) / 3.0
+        expected = (np.array(runs[1]) - np.array(runs[-1])) / (2.0 * size)
         scale = max(np.abs(expected).max(), np.abs(found[key]).max(), 1e-3)
         assert np.abs(found[key] - expected).max() <= close * scale, key
     return counts

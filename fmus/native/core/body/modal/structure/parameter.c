@@ -43,11 +43,11 @@ VI_RARE static double force_slope(const vi_structure *s, const vi_parameter *par
     const vi_contact_force now = vi_structure_yield(s, k);
     const vi_law *law = vi_law_of(s->contacts[k].law.law);
     double slope = -now.stiffness * vi_structure_direction(s, k) * parameter->position;
-    if (!(now.force > 0.0)) {
-        return slope;
-    }
     if (press.kind == VI_PRESS_LINEAR) {
         return slope + parameter->press_stiffness * depth + (law->damped ? parameter->press_damping * rate : 0.0);
+    }
+    if (!(now.force > 0.0)) {
+        return slope;
     }
     slope += parameter->press_stiffness * now.force / press.stiffness;
     slope += law->damped ? parameter->press_damping * press.stiffness * pow(depth, press.exponent) * rate : 0.0;

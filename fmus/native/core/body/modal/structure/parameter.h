@@ -23,6 +23,7 @@ typedef struct {
 typedef struct {
     double q[VI_MODES], p[VI_MODES];
     double shift;              /* of the instant of the present event, 0 between events */
+    double largest;            /* of the terms of a contact's change so far, beside which smaller ones are rounding */
     double hit[VI_PORTS];      /* of the approach at the present impact */
     double last_time[VI_PORTS], last_velocity[VI_PORTS]; /* of these outputs of the contacts */
     int64_t undefined;         /* the motion has no derivative: 64 bits, to avoid padding */

@@ -6,6 +6,7 @@
 #include "body/modal/forces.h"
 #include "body/modal/structure/variational_flow.h"
 #include "contact/complementarity.h"
+#include "motion/majorant.h"
 
 /* Change of a contact's place at an event, relative to the terms of the change, that is rounding. A larger one is another
  * instant: contacts that meet together by chance have no derivative. */
@@ -69,6 +70,7 @@ VI_RARE void vi_sensitivity_meet(const vi_structure *s, int k)
     vi_sensitivity_end(s);
     for (int i = 0; i < s->sensitive->count; ++i) {
         const double place = place_of(s, i, k, &size);
+        s->sensitive->of[i].largest = vi_max(s->sensitive->of[i].largest, size);
         s->sensitive->of[i].shift = place == 0.0 ? 0.0 : -place / approach;
         s->sensitive->of[i].undefined |= !isfinite(s->sensitive->of[i].shift);
     }
@@ -91,9 +93,10 @@ VI_RARE void vi_sensitivity_end(const vi_structure *s)
 /* A contact at its stop whose place would change has no derivative: it would hit at another instant. */
 VI_RARE static void expect_place(const vi_structure *s, int i, int k)
 {
+    vi_sensitivity *of = &s->sensitive->of[i];
     double size;
     const double place = place_of(s, i, k, &size);
-    s->sensitive->of[i].undefined |= !(fabs(place) <= SAME_PLACE * size);
+    of->undefined |= !(fabs(place) <= SAME_PLACE * vi_max(size, of->largest));
 }
 
 /* Impulses act on changed masses: row row' less of their effect. */

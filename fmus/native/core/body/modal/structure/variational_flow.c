@@ -16,6 +16,8 @@ static const double FIRST = 3.0, SHORTEST = 1e-11;
 /* Factors of the next step, after success with few columns and after failure. Each failure also allows a larger error of
  * the short step: the end of a force has no derivatives, and rounding does not shrink. */
 static const double LONGER = 1.7, SHORTER = 0.4, LOOSER = 1.6;
+/* Relative error up to which the end of a step tells the size of what follows. */
+static const double ROUGHLY = 1e-3;
 /* Rounding of an acceleration, relative to its terms. */
 static const double ROUNDING = 64.0 * DBL_EPSILON;
 /* Part of a size that the next step takes over. */
@@ -186,12 +188,30 @@ VI_RARE static double size_of(int n, double y[ROWS][VI_MODES], int first, double
     return size;
 }
 
-/* One step from y; returns the columns that it needed, 0 when the error stays above the tolerance. */
-VI_RARE static int extrapolate(segment_of_change *it, double u, double length, double tolerance, double y[ROWS][VI_MODES],
-                       double end[ROWS][VI_MODES])
+/* Is the error of a step within the tolerance of its size? A size that is roughly right serves the next steps, too. */
+VI_RARE static bool is_accurate(segment_of_change *it, double length, double tolerance, double y[ROWS][VI_MODES],
+                                double end[ROWS][VI_MODES], double error[ROWS][VI_MODES])
 {
     const int n = vi_structure_free_modes(it->s.model);
     const double rate = vi_max(it->s.model->fastest, 1.0 / length);
+    bool good = true;
+    for (int first = it->with_motion ? MOTION : CHANGE; first < ROWS; first += CHANGE) {
+        const int which = first / CHANGE;
+        const double reached = size_of(n, end, first, rate), wrong = size_of(n, error, first, rate);
+        const double size = vi_max(it->size[which], vi_max(size_of(n, y, first, rate), reached));
+        good = good && wrong <= tolerance * size + ROUNDING * it->terms[which] * length;
+        if (wrong <= ROUGHLY * reached) {
+            it->size[which] = vi_max(it->size[which], reached);
+        }
+    }
+    return good;
+}
+
+/* One step from y; returns the columns that it needed, 0 when the error stays above the tolerance. */
+VI_RARE static int extrapolate(segment_of_change *it, double u, double length, double tolerance,
+                               double y[ROWS][VI_MODES], double end[ROWS][VI_MODES])
+{
+    const int n = vi_structure_free_modes(it->s.model);
     point column[COLUMNS], error;
     for (int k = 0; k < COLUMNS; ++k) {
         midpoint(it, u, length, STEPS[k], y, column[k]);
@@ -205,21 +225,14 @@ VI_RARE static int extrapolate(segment_of_change *it, double u, double length, d
             continue;
         }
         move_point(n, error, column[0], -1.0, column[1]);
-        bool good = true;
-        for (int first = it->with_motion ? MOTION : CHANGE; first < ROWS; first += CHANGE) {
-            double *size = &it->size[first / CHANGE];
-            *size = vi_max(*size, vi_max(size_of(n, y, first, rate), size_of(n, end, first, rate)));
-            const double rounding = ROUNDING * it->terms[first / CHANGE] * length;
-            good = good && size_of(n, error, first, rate) <= tolerance * *size + rounding;
-        }
-        if (good) {
+        if (is_accurate(it, length, tolerance, y, end, error)) {
             return k + 1;
         }
     }
     return 0;
 }
 
-VI_RARE static bool follows_motion(const vi_structure *s, const vi_parameter *parameter)
+static bool follows_motion(const vi_structure *s, const vi_parameter *parameter)
 {
     bool follows = parameter->mass != 0.0 || parameter->damping != 0.0 || parameter->stiffness != 0.0;
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -236,6 +249,7 @@ VI_RARE static void integrate(const vi_structure *s, const vi_parameter *paramet
     point y, end;
     it.s.state = &it.state;
     memset(it.state.leaving, 0, sizeof it.state.leaving);
+    it.state.exchange.on = 1; /* forces go on smoothly beyond the end of their contact, as for any integrator */
     memset(y, 0, sizeof y);
     memcpy(y[MOTION], s->sensitive->before_q, size);
     memcpy(y[MOTION + 1], s->sensitive->before_p, size);
