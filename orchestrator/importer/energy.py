@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.importer.component import description_of
+from vibroimpact.orchestrator.importer.described import description_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.feedthrough import connection_name
 from vibroimpact.orchestrator.importer.master import Importer

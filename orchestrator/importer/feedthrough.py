@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from typing import Any
 
-from vibroimpact.orchestrator.importer.component import Component, description_of
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.described import description_of
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 
 Connections = Sequence[ConnectionSpec]

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.fmi.exchange import ExchangeInstance
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
+from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
+from vibroimpact.orchestrator.importer.described import kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.stop_contacts.law_bond import LawBond

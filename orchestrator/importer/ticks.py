@@ -15,7 +15,8 @@ from fractions import Fraction
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.clock_calls import ClockedInstance, Interval
 from vibroimpact.orchestrator.fmi.clocks import CHANGING, COUNTDOWN, TUNABLE, Clock
-from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
+from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component
+from vibroimpact.orchestrator.importer.described import kind_of
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 
 

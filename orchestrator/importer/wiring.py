@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
-from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.described import kind_of
 from vibroimpact.orchestrator.importer.feedthrough import Connections, TransferOrder, connection_name
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 

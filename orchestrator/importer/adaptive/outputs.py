@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.described import kind_of
 
 Floats = NDArray[np.float64]
 REAL_KINDS = ("Float64", "Float32")

@@ -7,7 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.described import kind_of
 from vibroimpact.orchestrator.importer.feedthrough import connection_name
 from vibroimpact.orchestrator.importer.wiring import Transfer
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from vibroimpact.orchestrator.fmi.instance import Wrapper
-from vibroimpact.orchestrator.importer.component import description_of
+from vibroimpact.orchestrator.importer.described import description_of
 from vibroimpact.orchestrator.run.limits import why_not_pushed, why_not_thrown_back
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.window import recorded_window

@@ -17,7 +17,7 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.packaging.replay_fmu import build_replay
-from vibroimpact.orchestrator.importer.component import kind_of
+from vibroimpact.orchestrator.importer.described import kind_of
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.running import run_scene
