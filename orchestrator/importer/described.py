@@ -1,4 +1,4 @@
-"""What an importer reads in the description of an FMU."""
+"""Facts that an importer reads in the description of an FMU."""
 
 from __future__ import annotations
 

@@ -117,15 +117,12 @@ class Importer(TrialSteps):
         log: Callable[[str], LogTail] | None = None,
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
-        divisions = divisions or Divisions((math.inf if macro_step == "auto" else macro_step,))
-        parts = parts_of(
-            components, connections, events, contacts, pairs, divisions, contact_steps, log, wrap
-        )
-        self.components, self._order = parts.named, parts.components
         self.macro_step = math.inf if macro_step == "auto" else macro_step
-        self.watches, self.contacts = parts.watches, parts.contacts
-        self.transfers, self.loops = parts.transfers, parts.loops
-        self.tuning, self.ticks, self.grids = parts.tuning, parts.ticks, parts.grids
+        cuts = divisions or Divisions((self.macro_step,))
+        parts = parts_of(components, connections, events, contacts, pairs, cuts, contact_steps, log, wrap)
+        self.components, self._order = parts.named, parts.components
+        self.watches, self.contacts, self.transfers = parts.watches, parts.contacts, parts.transfers
+        self.loops, self.tuning, self.ticks, self.grids = parts.loops, parts.tuning, parts.ticks, parts.grids
         self._progress = Progress()
         adapts = macro_step == "auto" and needs_coupling_steps(parts, contacts, pairs)
         self._plan = StepPlan(parts, exchange, self._progress, tries=adapts)
