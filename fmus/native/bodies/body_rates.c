@@ -61,8 +61,8 @@ VI_RARE static const char *rate_of_base(const vi_structure *s, const vi_body *c,
 
 /* ---- motion ---- */
 
-/* What the forces of a pressed contact gain by the motion of its stop and, at order 2, by the bend of a power law. `first`
- * is the change of order 1. */
+/* The gain of a pressed contact's force by the motion of its stop and, at order 2, by the bend of a power law. `first` is
+ * the change of order 1. */
 VI_RARE static double force_of_contact(const vi_structure *s, int k, int order, const vi_variation *first)
 {
     const double sign = vi_structure_direction(s, k), depth = -vi_structure_clearance(s, k);

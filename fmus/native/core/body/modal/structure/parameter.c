@@ -19,7 +19,7 @@ VI_RARE static double base_acceleration(const vi_structure *s)
     return all->base_held + all->base_rate * since + all->base_amplitude * vi_structure_phase(s).cosine;
 }
 
-/* What the matrices add to the loads: minus the forces of the changed masses, dashpots and springs. */
+/* Add the part of the matrices to the loads: minus the forces of the changed masses, dashpots and springs. */
 VI_RARE static void add_matrices(const vi_structure *s, const vi_parameter *parameter, vi_variation *change)
 {
     double acceleration[VI_MODES], force[VI_PORTS], pull = 0.0;
@@ -34,7 +34,7 @@ VI_RARE static void add_matrices(const vi_structure *s, const vi_parameter *para
     }
 }
 
-/* What the parameter of a pressed stop adds to its force. */
+/* The slope of a pressed stop's force over its parameter. */
 VI_RARE static double force_slope(const vi_structure *s, const vi_parameter *parameter)
 {
     const int k = (int)parameter->port;
