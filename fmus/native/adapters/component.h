@@ -77,8 +77,8 @@ typedef struct {
     /* Carry a change from knowns to unknowns, and by the transposed equations back; NULL: both are the same. */
     void (*carry)(void *self, vi_variation *change);
     void (*carry_back)(void *self, vi_variation *change);
-    /* Set a zeroed change to the derivative over time of this order, 1 to VI_MOST_ORDER, before it is carried. `first`
-     * is the carried one of order 1. Returns NULL, or what has no such derivative. NULL: nothing changes between events. */
+    /* Set a zeroed change to the derivative over time of this order, before it is carried. Orders are 1 to VI_MOST_ORDER,
+     * and `first` is the carried change of order 1. Returns NULL, or what has no such derivative. NULL: nothing changes between events. */
     const char *(*rate)(void *self, int order, const vi_variation *first, vi_variation *change);
     /* The second derivative of an unknown along the first one over time, where the unknown is no linear form of a change.
      * NULL: all are. */

@@ -96,8 +96,8 @@ typedef struct {
      * zeroed. False: it is none. The base's acceleration is a known of the component for its loads alone. */
     bool (*column)(void *self, size_t offset, vi_line *line);
     bool (*row)(void *self, size_t offset, vi_line *line);
-    /* Set how the equations, and the start in `of`, depend on a parameter of the component's own at this offset. Both
-     * are zeroed. False: the component has no derivative over it. */
+    /* Set the slopes of the equations, and of the start in `of`, over a parameter of the component's own at this offset.
+     * Both are zeroed. False: the component has no derivative over it. */
     bool (*parameter)(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of);
 } vi_body_form;
 

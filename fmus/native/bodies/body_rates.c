@@ -61,7 +61,7 @@ VI_RARE static const char *rate_of_base(const vi_structure *s, const vi_body *c,
 
 /* ---- motion ---- */
 
-/* Gain of the force of a pressed contact by the motion of its stop and, at order 2, by the bend of a power law. `first` is
+/* The gain of a pressed contact's force by the motion of its stop and, at order 2, by the bend of a power law. `first` is
  * the change of order 1. */
 VI_RARE static double force_of_contact(const vi_structure *s, int k, int order, const vi_variation *first)
 {

@@ -34,7 +34,7 @@ VI_RARE static void add_matrices(const vi_structure *s, const vi_parameter *para
     }
 }
 
-/* Slope of the force of a pressed stop over the parameter. */
+/* The slope of a pressed stop's force over its parameter. */
 VI_RARE static double force_slope(const vi_structure *s, const vi_parameter *parameter)
 {
     const int k = (int)parameter->port;

@@ -1,4 +1,4 @@
-/* Dependence of the equations of a body on its parameters, and the derivatives of its motion over them. equations.md 6.17 */
+/* Slopes of the equations of a body over its parameters, and the derivatives of its motion over them. equations.md 6.17 */
 #ifndef VIBROIMPACT_PARAMETER_H
 #define VIBROIMPACT_PARAMETER_H
 
@@ -7,7 +7,7 @@
 
 enum { VI_KEYS = 16 }; /* most parameters of one body */
 
-/* Dependence of the equations of a body on one parameter. All 0, port -1: they do not depend on it. */
+/* Slopes of the equations of a body over one parameter. All 0, port -1: they do not depend on it. */
 typedef struct {
     double force[VI_MODES];            /* slopes of the modal amplitudes of the harmonic force */
     double base;                       /* slope of the amplitude of the harmonic base acceleration */
