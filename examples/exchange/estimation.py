@@ -18,7 +18,11 @@ import vibroimpact as vi
 KEYS = ("contact[1].restitution", "contact[1].position", "forcing.amplitude", "stiffness", "damping")
 TRUE = np.array([0.7, 0.6, 0.5, 1.0, 0.2])
 GUESS = np.array([0.74, 0.61, 0.51, 0.98, 0.22])
-STARTS = {"forcing.angular_frequency": 1.0, "contact[1].law": "restitution", "contact[1].position": 0.6}
+STARTS: dict[str, float | str] = {
+    "forcing.angular_frequency": 1.0,
+    "contact[1].law": "restitution",
+    "contact[1].position": 0.6,
+}
 
 
 def run(fmu: Path, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

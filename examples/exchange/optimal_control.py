@@ -11,6 +11,7 @@ import sys
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,7 +24,7 @@ INTERVALS, SUBSTEPS = 40, 3  # of the force, which is constant in each; of its i
 BODY = {"mass": 1.0, "stiffness": 1.0, "damping": 0.2}
 INPUTS = ("force", "force_rate", "base_acceleration", "base_acceleration_rate")
 START = {"displacement_start": STOP, "velocity_start": -RESTITUTION * IMPACT}
-CONTACT = {
+CONTACT: dict[str, float | str] = {
     "contact[1].law": "restitution",
     "contact[1].position": STOP,
     "contact[1].restitution": RESTITUTION,
@@ -59,7 +60,12 @@ def least_force(flight: ca.Function) -> np.ndarray:
         problem.subject_to(x[0, i] <= STOP)
     problem.subject_to(x[:, 0] == ca.vertcat(STOP, -RESTITUTION * IMPACT))  # after the impact
     problem.subject_to(x[:, INTERVALS] == ca.vertcat(STOP, IMPACT))  # before the next
-    quiet = {"print_level": 0, "sb": "yes", "hessian_approximation": "limited-memory", "tol": 1e-10}
+    quiet: dict[str, Any] = {
+        "print_level": 0,
+        "sb": "yes",
+        "hessian_approximation": "limited-memory",
+        "tol": 1e-10,
+    }
     problem.solver("ipopt", {"print_time": False}, quiet)
     return np.array(problem.solve().value(force))
 

@@ -67,7 +67,7 @@ KEYS = {
     ),
     "Structure": ("contact[1].restitution", "contact[1].position", "forcing.amplitude", "forcing.phase"),
 }
-COUNTS: dict[str, dict[str, int]] = {"Chain": {"masses": 3}, "Beam": {"modes": 4}}
+COUNTS: dict[str, dict[str, Any]] = {"Chain": {"masses": 3}, "Beam": {"modes": 4}}
 MOVING = {"forcing.angular_frequency": 1.3, "forcing.amplitude": 0.5}
 OSCILLATOR = {**forced(0.5, 1.3), "displacement_start": -0.1, "velocity_start": 0.2}
 CHAIN = {
@@ -392,7 +392,7 @@ def test_setups_without_derivatives_are_refused(followed: Callable[..., Path]) -
     ],
 )
 def test_other_keys_are_refused_by_name(tmp_path: Path, component: str, names: str, reason: str) -> None:
-    counts = {"Chain": {"masses": 64, "contacts": 8}}.get(component, {})
+    counts: dict[str, Any] = {"masses": 64, "contacts": 8} if component == "Chain" else {}
     if component == "Chain":
         names = ",".join(f"mass[{k}]" for k in range(1, 17))
     with pytest.raises(UsageError, match=r".*") as error:
