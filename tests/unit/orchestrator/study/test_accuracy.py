@@ -250,6 +250,8 @@ def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
         steps, errors = ladder(study, f"coupled, {exchange}")
         assert observed_order(steps, errors) == pytest.approx(order, abs=0.2), exchange
+        tolerances, errors = ladder(study, f"chosen steps, {exchange}")
+        assert observed_order(tolerances, errors) == pytest.approx(order / (order + 1.0), abs=0.2), exchange
 
 
 def test_a_component_of_another_tool_that_restores_no_state_is_named(tmp_path: Path) -> None:
