@@ -106,6 +106,45 @@ def test_an_input_clock_ticks_at_its_instants(served: Servers, folder: Path) -> 
     assert motion[1] > 3.0  # ten times the ticks, times the gain
 
 
+def test_clocks_of_all_kinds_tick_at_their_instants(served: Servers, folder: Path) -> None:
+    timed = fmu_factory.timed(folder)
+    parts = [part("a", timed), part("b", timed, period=0.3, delay=0.0)]
+    names = ["beats", "strides", "fuses", "hits", "sum", "last"]
+    found = []
+    for each in (parts, [served.there(spec) for spec in parts]):
+        run = Run(each, [link("a.out", "b.hit")], in_c=True, macro_step=0.2).go(1.95)
+        found.append([run.importer.components[c].group("Float64", names).get().tobytes() for c in "ab"])
+        assert not run.failure
+        run.importer.free()
+    assert found[0] == found[1]
+
+
+def test_sizes_arrays_and_texts(served: Servers, folder: Path) -> None:
+    fmu = fmu_factory.typed(folder)
+    values = {
+        "rows": 1,
+        "columns": 2,
+        "a_Float64": (0.1, -2.5),
+        "p_String": "Grüße",
+        "a_String": ("", "x" * 5000),
+    }
+    spec = ComponentSpec("t", fmu, values)
+    found = []
+    for each in (spec, served.there(spec)):
+        run = Run([each], [], in_c=True, macro_step=0.5).go(1.0)
+        component = run.importer.components["t"]
+        texts = component.group("String", ["y_String", "b_String"]).get().tolist()
+        found.append((component.group("Float64", ["b_Float64"]).get().tobytes(), texts))
+        run.importer.free()
+    assert found[0] == found[1]
+    assert texts == ["Grüße", "", "x" * 5000]
+
+
+def test_a_step_that_calls_back_is_given_a_callback_there(served: Servers, folder: Path) -> None:
+    parts = [part("m", fmu_factory.updating_mass(folder), k=1.0, x=0.1)]
+    same(served, parts, [], 1.0, elsewhere=["m"], macro_step=0.1)
+
+
 def test_a_loop_is_solved_with_derivatives_and_refused_values(served: Servers, folder: Path) -> None:
     fmu = fmu_factory.feedthrough(folder, "2.0")
     parts = [part("a", fmu, l=0.5), part("b", fmu, l=0.3)]
