@@ -188,7 +188,8 @@ VI_RARE static double size_of(int n, double y[ROWS][VI_MODES], int first, double
     return size;
 }
 
-/* Is the error of a step within the tolerance of its size? A size that is roughly right serves the next steps, too. */
+/* Is the error of a step within the tolerance of its size? A derivative that begins at 0 takes over a size that is roughly
+ * right for the next steps. */
 VI_RARE static bool is_accurate(segment_of_change *it, double length, double tolerance, double y[ROWS][VI_MODES],
                                 double end[ROWS][VI_MODES], double error[ROWS][VI_MODES])
 {
@@ -200,7 +201,7 @@ VI_RARE static bool is_accurate(segment_of_change *it, double length, double tol
         const double reached = size_of(n, end, first, rate), wrong = size_of(n, error, first, rate);
         const double size = vi_max(it->size[which], vi_max(size_of(n, y, first, rate), reached));
         good = good && wrong <= tolerance * size + ROUNDING * it->terms[which] * length;
-        if (wrong <= ROUGHLY * reached) {
+        if (good || (wrong <= ROUGHLY * reached && size_of(n, y, first, rate) == 0.0)) {
             it->size[which] = vi_max(it->size[which], reached);
         }
     }
@@ -241,10 +242,24 @@ static bool follows_motion(const vi_structure *s, const vi_parameter *parameter)
     return follows;
 }
 
+/* Fastest rate of the modes and of the linear stops that press, rad/s. */
+VI_RARE static double fastest_rate(const vi_structure *s)
+{
+    double rate = s->model->fastest;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_YIELDING) {
+            const vi_contact_force slopes = vi_structure_yield(s, k);
+            const double mobility = s->model->compliance[k][k];
+            rate += sqrt(slopes.stiffness * mobility) + slopes.damping * mobility;
+        }
+    }
+    return rate;
+}
+
 VI_RARE static void integrate(const vi_structure *s, const vi_parameter *parameter, vi_sensitivity *of, double u)
 {
     const size_t size = (size_t)vi_structure_free_modes(s->model) * sizeof(double);
-    const double fastest = s->model->fastest;
+    const double fastest = fastest_rate(s);
     segment_of_change it = {*s, *s->state, s->state->now, parameter, follows_motion(s, parameter), {0.0, 0.0}, {0.0, 0.0}};
     point y, end;
     it.s.state = &it.state;
