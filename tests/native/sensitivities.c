@@ -33,8 +33,8 @@ static vi_structure body_of(uint64_t seed, double moved, double faster, bool fol
     model.contacts = 1 + (int)choice(&seed, CONTACTS);
     model.tolerance = 1e-12;
     for (int j = 0; j < model.modes; ++j) {
-        vi_structure_mode(&model, j, uniform(&seed, 0.3, 3.0) + 2.0 * j, uniform(&seed, 0.0, 0.2), uniform(&seed, 0.0, 1.0),
-                          model.clock.angular_frequency);
+        vi_structure_mode(&model, j, uniform(&seed, 0.3, 3.0) + 2.0 * j, uniform(&seed, 0.0, 0.2),
+                          uniform(&seed, 0.0, 1.0), model.clock.angular_frequency);
         state.p[j] = uniform(&seed, -1.0, 1.0);
         model.observed[j] = 1.0;
         for (int k = 0; k < CONTACTS; ++k) {
@@ -63,8 +63,16 @@ static vi_structure body_of(uint64_t seed, double moved, double faster, bool fol
         sensitive.parameter[2].row[0] = sensitive.parameter[2].mass = 1.0;
     }
     vi_structure_prepare(&model);
-    const vi_structure s = {&model,   &state, contacts, &record, &pressed, &scan,
-                            NULL,     NULL,   {0, NULL, NULL, NULL}, followed ? &sensitive : NULL};
+    const vi_structure s = {&model,
+                            &state,
+                            contacts,
+                            &record,
+                            &pressed,
+                            &scan,
+                            NULL,
+                            NULL,
+                            {0, NULL, NULL, NULL},
+                            followed ? &sensitive : NULL};
     vi_structure_start(&s, (vi_instant){0, 0.0, 0.0});
     return s;
 }

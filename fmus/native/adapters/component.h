@@ -19,7 +19,14 @@
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
 
 /* VI_SENSITIVITY: a derivative since the start, which is no variable of the table and is read only. */
-enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3, VI_SET_STATE = 4, VI_SENSITIVITY = 5 };
+enum {
+    VI_READ_ONLY = 0,
+    VI_SET_INITIAL = 1,
+    VI_SET_TUNABLE = 2,
+    VI_SET_INPUT = 3,
+    VI_SET_STATE = 4,
+    VI_SENSITIVITY = 5
+};
 
 /* One variable; its value reference is its index in the table. */
 typedef struct {

@@ -46,7 +46,7 @@ struct vi_instance {
     size_t start_count;
     uint32_t *references;    /* the component's references for 1, 2, ... of the description; NULL: the same */
     size_t reference_count;
-    vi_derivative_pair *pairs;          /* of outputs and parameters, whose derivatives are further variables; NULL: there are none */
+    vi_derivative_pair *pairs; /* whose derivatives are further variables; NULL: none are */
     vi_variable *slots;      /* these variables */
     size_t pair_count;
     void *resources;         /* resources opened by the component; NULL for most components */

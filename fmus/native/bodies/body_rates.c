@@ -89,8 +89,7 @@ VI_RARE static bool rests_on_moving_stop(const vi_structure *s)
     bool rests = false;
     for (int k = 0; k < s->model->contacts && vi_structure_stops_move(s->model); ++k) {
         const int32_t status = s->state->status[k];
-        rests |= vi_structure_stop_moves(s->model, k)
-                 && (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD);
+        rests |= vi_structure_stop_moves(s->model, k) && (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD);
     }
     return rests;
 }

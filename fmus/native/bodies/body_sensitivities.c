@@ -120,9 +120,10 @@ VI_RARE bool vi_body_follow(void *self, const vi_derivative_pair pairs[], size_t
         }
         if (key == VI_KEYS || !is_followed(self, pairs[i].unknown)
             || !find_parameter(self, pairs[i].known, &c->sensitive.parameter[key], &c->sensitive.of[key])) {
-            (void)snprintf(message, VI_MESSAGE_LENGTH, "sensitivities.txt: expected outputs and at most %d parameters whose"
-                           " derivatives the body has, got %lu and %lu", VI_KEYS, (unsigned long)pairs[i].unknown,
-                           (unsigned long)pairs[i].known);
+            (void)snprintf(message, VI_MESSAGE_LENGTH,
+                           "sensitivities.txt: expected outputs and at most %d parameters whose"
+                           " derivatives the body has, got %lu and %lu",
+                           VI_KEYS, (unsigned long)pairs[i].unknown, (unsigned long)pairs[i].known);
             return false;
         }
         followed->key[key] = pairs[i].known;

@@ -257,7 +257,8 @@ fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 
 fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference references[], size_t count, const fmi3Clock values[])
 {
-    return count == 1 && values[0] && exchanged_tick(of(c), references[0]) ? fmi3OK : wrong(c, "SetClock at a wrong time");
+    return count == 1 && values[0] && exchanged_tick(of(c), references[0]) ? fmi3OK
+                                                                           : wrong(c, "SetClock at a wrong time");
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference references[], size_t count,
@@ -267,7 +268,9 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference refer
     if (count != 1 || references[0] != FUSE || (m->mode != INITIALIZING && m->mode != EVENT_MODE)) {
         return wrong(c, "GetIntervalDecimal of a wrong clock, or in a wrong mode");
     }
-    qualifiers[0] = m->is_lit ? fmi3IntervalChanged : isfinite(m->fuse) ? fmi3IntervalUnchanged : fmi3IntervalNotYetKnown;
+    qualifiers[0] = m->is_lit           ? fmi3IntervalChanged
+                    : isfinite(m->fuse) ? fmi3IntervalUnchanged
+                                        : fmi3IntervalNotYetKnown;
     m->fuse = m->is_lit ? m->real[0] + m->real[AT] : m->fuse;
     intervals[0] = m->real[AT];
     m->is_lit = false;

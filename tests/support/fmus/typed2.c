@@ -77,25 +77,25 @@ fmi2Status fmi2Reset(fmi2Component c)
 }
 
 /* Functions that read and write variables of a type, whose cells have its values in `field`. */
-#define MOVE(NAME, TYPE, FIELD, CELL)                                                                            \
-    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2ValueReference references[], size_t count, TYPE values[]) \
-    {                                                                                                             \
-        instance *i = called(c);                                                                                  \
-        for (size_t n = 0; n < count; n++) {                                                                      \
-            values[n] = (TYPE)typed_get(&i->t, references[n], 0).FIELD;                                           \
-        }                                                                                                         \
-        return fmi2OK;                                                                                            \
-    }                                                                                                             \
-    fmi2Status fmi2Set##NAME(fmi2Component c, const fmi2ValueReference references[], size_t count,                \
-                             const TYPE values[])                                                                 \
-    {                                                                                                             \
-        instance *i = called(c);                                                                                  \
-        fmi2Status status = fmi2OK;                                                                               \
-        for (size_t n = 0; n < count; n++) {                                                                      \
-            const cell value = {.FIELD = (CELL)values[n]};                                                        \
-            status = typed_set(&i->t, references[n], 0, value) ? status : fmi2Error;                              \
-        }                                                                                                         \
-        return status;                                                                                            \
+#define MOVE(NAME, TYPE, FIELD, CELL)                                                                                  \
+    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2ValueReference references[], size_t count, TYPE values[])      \
+    {                                                                                                                  \
+        instance *i = called(c);                                                                                       \
+        for (size_t n = 0; n < count; n++) {                                                                           \
+            values[n] = (TYPE)typed_get(&i->t, references[n], 0).FIELD;                                                \
+        }                                                                                                              \
+        return fmi2OK;                                                                                                 \
+    }                                                                                                                  \
+    fmi2Status fmi2Set##NAME(fmi2Component c, const fmi2ValueReference references[], size_t count,                     \
+                             const TYPE values[])                                                                      \
+    {                                                                                                                  \
+        instance *i = called(c);                                                                                       \
+        fmi2Status status = fmi2OK;                                                                                    \
+        for (size_t n = 0; n < count; n++) {                                                                           \
+            const cell value = {.FIELD = (CELL)values[n]};                                                             \
+            status = typed_set(&i->t, references[n], 0, value) ? status : fmi2Error;                                   \
+        }                                                                                                              \
+        return status;                                                                                                 \
     }
 
 MOVE(Real, fmi2Real, real, double)

@@ -126,35 +126,35 @@ static fmi3Status may_set(instance *i, fmi3ValueReference reference)
 }
 
 /* Functions that read and write variables of a type, whose cells have its values in `field`. */
-#define MOVE(NAME, TYPE, KIND, FIELD, CELL)                                                                         \
-    fmi3Status fmi3Get##NAME(fmi3Instance c, const fmi3ValueReference references[], size_t count, TYPE values[],    \
-                             size_t value_count)                                                                    \
-    {                                                                                                               \
-        instance *i = called(c);                                                                                    \
-        fmi3Status status = counted(i, references, count, value_count);                                             \
-        for (size_t n = 0; n < count && status == fmi3OK; n++) {                                                    \
-            status = typed_type(references[n]) == (KIND) ? fmi3OK : refused(i, "a variable of another type");       \
-            for (size_t k = 0; k < typed_size(&i->t, references[n]) && status == fmi3OK; k++) {                     \
-                *values++ = (TYPE)typed_get(&i->t, references[n], k).FIELD;                                         \
-            }                                                                                                       \
-        }                                                                                                           \
-        return status;                                                                                              \
-    }                                                                                                               \
-    fmi3Status fmi3Set##NAME(fmi3Instance c, const fmi3ValueReference references[], size_t count,                   \
-                             const TYPE values[], size_t value_count)                                               \
-    {                                                                                                               \
-        instance *i = called(c);                                                                                    \
-        fmi3Status status = counted(i, references, count, value_count);                                             \
-        for (size_t n = 0; n < count && status == fmi3OK; n++) {                                                    \
-            status = may_set(i, references[n]);                                                                     \
-            const size_t size = typed_size(&i->t, references[n]);                                                   \
-            for (size_t k = 0; k < size && status == fmi3OK; k++) {                                                 \
-                const cell value = {.FIELD = (CELL)*values++};                                                      \
-                const bool good = typed_type(references[n]) == (KIND) && typed_set(&i->t, references[n], k, value); \
-                status = good ? fmi3OK : refused(i, "a variable that cannot have this value");                      \
-            }                                                                                                       \
-        }                                                                                                           \
-        return status;                                                                                              \
+#define MOVE(NAME, TYPE, KIND, FIELD, CELL)                                                                            \
+    fmi3Status fmi3Get##NAME(fmi3Instance c, const fmi3ValueReference references[], size_t count, TYPE values[],       \
+                             size_t value_count)                                                                       \
+    {                                                                                                                  \
+        instance *i = called(c);                                                                                       \
+        fmi3Status status = counted(i, references, count, value_count);                                                \
+        for (size_t n = 0; n < count && status == fmi3OK; n++) {                                                       \
+            status = typed_type(references[n]) == (KIND) ? fmi3OK : refused(i, "a variable of another type");          \
+            for (size_t k = 0; k < typed_size(&i->t, references[n]) && status == fmi3OK; k++) {                        \
+                *values++ = (TYPE)typed_get(&i->t, references[n], k).FIELD;                                            \
+            }                                                                                                          \
+        }                                                                                                              \
+        return status;                                                                                                 \
+    }                                                                                                                  \
+    fmi3Status fmi3Set##NAME(fmi3Instance c, const fmi3ValueReference references[], size_t count, const TYPE values[], \
+                             size_t value_count)                                                                       \
+    {                                                                                                                  \
+        instance *i = called(c);                                                                                       \
+        fmi3Status status = counted(i, references, count, value_count);                                                \
+        for (size_t n = 0; n < count && status == fmi3OK; n++) {                                                       \
+            status = may_set(i, references[n]);                                                                        \
+            const size_t size = typed_size(&i->t, references[n]);                                                      \
+            for (size_t k = 0; k < size && status == fmi3OK; k++) {                                                    \
+                const cell value = {.FIELD = (CELL) * values++};                                                       \
+                const bool good = typed_type(references[n]) == (KIND) && typed_set(&i->t, references[n], k, value);    \
+                status = good ? fmi3OK : refused(i, "a variable that cannot have this value");                         \
+            }                                                                                                          \
+        }                                                                                                              \
+        return status;                                                                                                 \
     }
 
 MOVE(Float64, fmi3Float64, FLOAT64, real, double)

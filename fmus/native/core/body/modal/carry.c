@@ -68,9 +68,10 @@ void vi_structure_carry(const vi_structure *s, vi_variation *change)
         change->load[j] -= model->mode[j].stiffness * change->displacement[j] + drag;
     }
     for (int k = 0; k < model->contacts; ++k) {
-        change->contact[k] = !slopes.pressed[k] ? 0.0
-                             : change->contact[k] + slopes.stiffness[k] * at_contact(s, k, change->displacement)
-                                   + slopes.damping[k] * at_contact(s, k, change->velocity);
+        change->contact[k] = !slopes.pressed[k]
+                                 ? 0.0
+                                 : change->contact[k] + slopes.stiffness[k] * at_contact(s, k, change->displacement)
+                                       + slopes.damping[k] * at_contact(s, k, change->velocity);
         add_shape(s, k, -vi_structure_direction(s, k) * change->contact[k], change->load);
     }
     if (!slopes.any_held) {

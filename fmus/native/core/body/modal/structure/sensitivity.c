@@ -100,7 +100,8 @@ VI_RARE static void expect_place(const vi_structure *s, int i, int k)
 }
 
 /* Impulses act on changed masses: row row' less of their effect. */
-VI_RARE static void add_impulses(const vi_structure *s, int i, double direction[VI_PORTS][VI_MODES], const double impulse[])
+VI_RARE static void add_impulses(const vi_structure *s, int i, double direction[VI_PORTS][VI_MODES],
+                                 const double impulse[])
 {
     const vi_parameter *parameter = &s->sensitive->parameter[i];
     double push = 0.0;
@@ -115,7 +116,7 @@ VI_RARE static void add_impulses(const vi_structure *s, int i, double direction[
 
 /* Give these contacts these changes of their approach, by impulses along `direction`. */
 VI_RARE static void constrain(const vi_structure *s, int i, double direction[VI_PORTS][VI_MODES],
-                      double mobility[VI_PORTS][VI_PORTS], const int active[], const double target[])
+                              double mobility[VI_PORTS][VI_PORTS], const int active[], const double target[])
 {
     double g[VI_PORTS][VI_PORTS], b[VI_PORTS] = {0.0}, x[VI_PORTS];
     vi_structure_signed(s, mobility, g);
@@ -149,7 +150,7 @@ VI_RARE static double rebound_slope(const vi_structure *s, int i, int k, double 
 }
 
 VI_RARE void vi_sensitivity_impact(const vi_structure *s, const int hit[], const int in_play[], const double approach[],
-                           const double impulse[])
+                                   const double impulse[])
 {
     vi_structure_model *model = s->model;
     for (int i = 0; i < s->sensitive->count; ++i) {

@@ -107,7 +107,8 @@ typedef struct {
 } segment_of_change;
 
 VI_RARE /* Forces that stops balance leave their rounding. */
-static void note_terms(segment_of_change *it, const vi_variation *change)
+    static void
+    note_terms(segment_of_change *it, const vi_variation *change)
 {
     for (int j = 0; j < vi_structure_free_modes(it->s.model); ++j) {
         const vi_mode *mode = &it->s.model->mode[j];
@@ -154,7 +155,7 @@ static void move_point(int n, double to[ROWS][VI_MODES], double from[ROWS][VI_MO
 }
 
 VI_RARE static void midpoint(segment_of_change *it, double u, double length, int steps, double y[ROWS][VI_MODES],
-                     double end[ROWS][VI_MODES])
+                             double end[ROWS][VI_MODES])
 {
     const int n = vi_structure_free_modes(it->s.model);
     const double h = length / (double)steps;
@@ -260,7 +261,8 @@ VI_RARE static void integrate(const vi_structure *s, const vi_parameter *paramet
 {
     const size_t size = (size_t)vi_structure_free_modes(s->model) * sizeof(double);
     const double fastest = fastest_rate(s);
-    segment_of_change it = {*s, *s->state, s->state->now, parameter, follows_motion(s, parameter), {0.0, 0.0}, {0.0, 0.0}};
+    segment_of_change it = {*s,         *s->state, s->state->now, parameter, follows_motion(s, parameter),
+                            {0.0, 0.0}, {0.0, 0.0}};
     point y, end;
     it.s.state = &it.state;
     memset(it.state.leaving, 0, sizeof it.state.leaving);
