@@ -127,8 +127,6 @@ class RunRecord:
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None
         Time (s), then the sampled variables without a form of their own.
-    formed_samples : tuple of ndarray, each of shape (sample, ...), or None
-        The sampled variables with a form (`sample_forms`): arrays, texts, enumerations, integers of 64 bits.
     final_displacement, final_velocity, final_phase : float
         State (m, m/s) and forcing phase (rad) at the end, from which a sweep continues.
     seconds : float
@@ -147,6 +145,8 @@ class RunRecord:
         or modes.
     scores : ndarray of float, shape (comparison, 6), or None
         Columns `SCORE_COLUMNS`, for each compared pair of a replay.
+    formed_samples : tuple of ndarray, each of shape (sample, ...), or None
+        The sampled variables with a form (`sample_forms`): arrays, texts, enumerations, integers of 64 bits.
     """
 
     outcome: Outcome
@@ -155,7 +155,6 @@ class RunRecord:
     impacts: NDArray[np.float64] | None = None
     sticks: NDArray[np.float64] | None = None
     samples: NDArray[np.float64] | None = None
-    formed_samples: tuple[NDArray[Any], ...] | None = None
     final_displacement: float = np.nan
     final_velocity: float = np.nan
     final_phase: float = np.nan
@@ -166,6 +165,7 @@ class RunRecord:
     chosen_steps: NDArray[np.float64] | None = None
     final_state: NDArray[np.float64] | None = None
     scores: NDArray[np.float64] | None = None
+    formed_samples: tuple[NDArray[Any], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
