@@ -36,6 +36,7 @@ WRITERS = {
     "StatelessMass": lambda folder, fmi: fmu_factory.mass(folder, fmi, states=False),
     "SteppedBall": fmu_factory.stepped_ball,
     "Timed": lambda folder, _: fmu_factory.timed(folder),
+    "Typed": fmu_factory.typed,
     "UpdatingMass": lambda folder, _: fmu_factory.updating_mass(folder),
 }
 GRAVITY, RESTITUTION, HEIGHT = 9.81, 0.7, 1.0
