@@ -29,11 +29,11 @@ enum {
     RATES_END,        /* NaN derivatives from `at` on */
     STUCK,            /* a time event at the present time, again and again */
     RATES_FATAL,      /* fatal error of the derivatives from `at` on */
-    CLOCKED,          /* clocks: each tick adds 1 to v; a countdown of `at`, lit by the third, stops the mass */
     FALLING,          /* a mass of `at` kg under gravity and the force u */
     PENDULUM, /* of 1 kg and 1 m: x is its angle; u pushes its tip along `tip`, the way of the tip to one side */
     WEAK, /* takes forces of 1000 N at most */
     LAST_FALL, /* falls, and asks for the end in the event mode after its first impact from outside */
+    CLOCKED,          /* clocks: each tick adds 1 to v; a countdown of `at`, lit by the third, stops the mass */
     KINDS
 };
 

@@ -173,7 +173,9 @@ def test_derivatives_pass_rigid_impacts_on_both_sides(followed: Callable[..., Pa
     [
         stop(0.3, law=KELVIN_VOIGT, stiffness=50.0, damping=0.7),
         stop(0.3, law=HERTZ, stiffness=500.0),
-        stop(0.3, law=HUNT_CROSSLEY, stiffness=500.0, damping=0.3, exponent=1.7),
+        pytest.param(
+            stop(0.3, law=HUNT_CROSSLEY, stiffness=500.0, damping=0.3, exponent=1.7), marks=pytest.mark.long
+        ),
     ],
     ids=["kelvin_voigt", "hertz", "hunt_crossley"],
 )

@@ -102,7 +102,7 @@ def test_a_tuned_interval_counts_from_the_event_that_tunes_it(folder: Path, time
 
 @pytest.mark.parametrize("macro_step", [0.07, 2.0])
 def test_clocks_tick_in_model_exchange(folder: Path, macro_step: float) -> None:
-    importer = Importer([part("m", folder / "Clocks.fmu", kind=16.0, x=0.0, at=0.1)], macro_step=macro_step)
+    importer = Importer([part("m", folder / "Clocks.fmu", kind=20.0, x=0.0, at=0.1)], macro_step=macro_step)
     importer.begin()
     importer.advance(1.1)
     x, v, count = values(importer, "m", "x", "v", "count")

@@ -115,7 +115,7 @@ def test_runs_without_a_force_have_classes_and_exponents_of_their_orbits() -> No
             ["--periods", "2"],
             "orbit: periods: expected 1 of a body without a force, whose orbits set it, got 2.",
         ),
-        (["--seed", "0.5"], "seed: expected none of a body without a force"),
+        (["--seed", "0.5"], "seed: expected none, by --seed or --from-dataset, of a body without a force"),
     ],
 )
 def test_orbits_that_no_body_without_a_force_has_are_refused(options: list[str], said: str) -> None:
