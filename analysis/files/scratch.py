@@ -37,7 +37,7 @@ def show_as(path: str, name: str) -> None:
 def with_names(text: str) -> str:
     """Return a message with the names of paths in scratch folders.
 
-    >>> show_as("/tmp/a/b.toml", "b.ssp"); with_names("/tmp/a/b.toml: expected a rate")
+    >>> show_as("scratch/b.toml", "b.ssp"); with_names("scratch/b.toml: expected a rate")
     'b.ssp: expected a rate'
     """
     for path, name in _shown.items():
