@@ -11,7 +11,7 @@ import itertools
 from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -60,6 +60,7 @@ _MOST_SHOWN = 6
 """Largest number of classes listed in one line."""
 _STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
 _BESIDE = ("impacts_per_period", "stick_count")
+_OPEN = "rests are not recorded: p may stand for infinitely many"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ class RunClass:
         p and q of a repeating motion; otherwise 0; p is -1 for infinitely many impacts. The q of a quasi-periodic
         motion is the number of its curves in the strobe section.
     reason : str
-        Reason why the class is unknown.
+        Reason why the class is unknown, or what the dataset leaves open.
     rotation : Rotation or None
         Rotation number of a quasi-periodic motion.
     """
@@ -198,6 +199,7 @@ class ClassesOfDataset(Study[RunClass]):
                 )
         known: dict[RunClass, RunClass] = {}  # millions of runs have few classes
         further, place = [name for name in _BESIDE if name in runs.variables], -1
+        open_count = "stick_count" not in runs.variables and _may_rest(runs)
         for block in columns_of_runs(runs, [*columns, *further, "outcome"]):
             states = np.stack([block[name] for name in columns], axis=-1)
             counts, sticks = (block.get(name) for name in _BESIDE)
@@ -211,6 +213,8 @@ class ClassesOfDataset(Study[RunClass]):
                 found = class_of(states[run], *beside, None if turns is None else turns[place])
                 if found.kind in (OrbitClass.unknown, OrbitClass.chaos):
                     found = _up_to_shift(states[run], columns, *beside) or found
+                if open_count and found.kind is OrbitClass.periodic:
+                    found = replace(found, reason=_OPEN)
                 yield known.setdefault(found, found)
 
     @property
@@ -255,6 +259,11 @@ def classify(dataset: xr.Dataset) -> ClassesOfRuns:
         The dataset has one value for all periods, or neither strobe nor extrema.
     """
     return whole(ClassesOfDataset(dataset)).classes
+
+
+def _may_rest(runs: xr.Dataset) -> bool:
+    """Tell whether a body may come to rest on a rigid stop."""
+    return any(name.endswith("restitution") for name in map(str, runs.variables))
 
 
 def _by_impacts(

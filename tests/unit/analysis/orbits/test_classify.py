@@ -118,6 +118,7 @@ def test_rest_sticking_no_impacts_and_failures_have_their_names() -> None:
     assert class_of(once, None).reason == "repeats after 1 periods; impacts are not recorded"
 
 
+_OPEN = "rests are not recorded: p may stand for infinitely many"
 SCENE = {
     "scene": {"units": "nondimensional"},
     "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05},
@@ -146,6 +147,21 @@ def test_next_to_a_doubling_a_short_run_is_still_told_right() -> None:
         "record": {**SCENE["record"], "transient_periods": 40, "recorded_periods": 30},
     }
     assert [each.name for each in classify(vi.run(near))] == ["P(1,1)"] * 3
+
+
+@pytest.mark.parametrize(("impacts", "expected"), [(True, ("P(inf,1)", "")), (False, ("P(36,1)", _OPEN))])
+def test_without_recorded_rests_a_class_says_that_its_impacts_may_be_infinitely_many(
+    impacts: bool, expected: tuple[str, str]
+) -> None:
+    chatter = {
+        **SCENE,
+        "forcing": {"amplitude": 1.0, "angular_frequency": 0.2},
+        "stop": [{"position": 0.0, "restitution": 0.7}],
+        "record": {**SCENE["record"], "transient_periods": 5, "recorded_periods": 10, "impacts": impacts},
+        "sweep": {},
+    }
+    [found] = classify(vi.run(chatter))
+    assert (found.name, found.reason) == expected
 
 
 def test_a_dataset_without_states_is_refused() -> None:
