@@ -405,6 +405,41 @@ def test_jacobi_does_not_depend_on_the_order_of_the_components(made: list[Import
     assert ends[0] == ends[1]
 
 
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_jacobi_gives_inputs_of_the_start_to_bodies_without_saved_states(
+    made: list[Importer], folder: Path, fmi: str
+) -> None:
+    ends = []
+    for states in (True, False):
+        mass = fmu_factory.mass(folder, fmi, states=states)
+        for names in ("ab", "ba"):
+            importer = begun(made, *masses(mass, names), exchange="jacobi", macro_step=0.1)
+            importer.advance(3.0)
+            ends.append([values(importer, name, "x", "v") for name in "ab"])
+    assert all(end == ends[0] for end in ends)
+
+
+def test_jacobi_takes_no_component_as_a_formula_that_names_a_state(
+    made: list[Importer], folder: Path
+) -> None:
+    source = fmu_factory.mass(folder, "3.0", states=False)
+    depends, state = ('dependencies=""', 'dependencies="3"'), ('name="v"', 'name="v" derivative="1"')
+    ends = []
+    for name, changes in (("plain", []), ("formula", [depends]), ("state", [depends, state])):
+        mass = fmu_factory.redescribed(source, folder / f"{name}.fmu", *changes)
+        parts, links = masses(mass, "ab")
+        importer = begun(made, parts, links[:1], exchange="jacobi", macro_step=0.1)
+        importer.advance(3.0)
+        ends.append(values(importer, "b", "x"))
+    assert ends[2] == ends[0] != ends[1]
+
+
+def masses(fmu: Path, names: str) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
+    """Return two masses in the order of their names, a moved by 1, with a force between them."""
+    parts = [part(name, fmu, k=4.0, x=float(name == "a")) for name in names]
+    return parts, [link("a.x", "b.f", 0.5), link("b.x", "a.f", 0.5)]
+
+
 @pytest.mark.parametrize(("exchange", "order"), [("jacobi", 1), ("gauss_seidel", 1), ("iterated", 2)])
 def test_the_error_of_an_exchange_falls_with_its_order(
     made: list[Importer], exchange: str, order: int
