@@ -106,6 +106,30 @@ def test_connections_are_moved_after_those_that_they_depend_on(folder: Path, gai
         component.free()
 
 
+def test_an_output_without_a_list_is_moved_after_all_inputs_of_its_component(folder: Path, gain: Path) -> None:
+    unlisted = fmu_factory.redescribed(gain, folder / "unlisted.fmu", ('index="2" dependencies="1"/>', 'index="2"/>'))
+    parts = {name: Component(part(name, unlisted)) for name in ("a", "b", "c")}
+    links = [link("c.y", "a.u"), link("b.y", "c.u")]
+    assert order_of(links, parts).connections == (links[1], links[0])
+    # a circle has no such order: the importer measures it, and solves it if it is a loop
+    circle = [*links, link("a.y", "b.u")]
+    order = order_of(circle, parts)
+    assert (order.loops, order.unlisted) == ((), ())
+    for component in parts.values():
+        component.free()
+
+
+def test_an_output_without_a_list_is_no_part_of_a_transfer_before_an_input(folder: Path, gain: Path) -> None:
+    lists = 'index="3" dependencies="1 2"', 'index="3"'
+    source = fmu_factory.redescribed(fmu_factory.feedthrough(folder, "2.0"), folder / "half.fmu", lists)
+    parts = {name: Component(part(name, source)) for name in "ab"} | {"c": Component(part("c", gain))}
+    links = [link("a.latched", "b.u"), link("a.y", "b.w"), link("c.y", "a.u")]
+    moved = [t.connections for t in transfers_of(order_of(links, parts), parts)]
+    assert moved.index((links[2],)) < moved.index((links[1],))
+    for component in parts.values():
+        component.free()
+
+
 def test_connections_between_the_same_two_components_are_one_transfer() -> None:
     parts = {name: Component(body(name, {})) for name in ("a", "b")}
     links = [link("a.displacement", "b.force"), link("a.velocity", "b.base_acceleration")]
