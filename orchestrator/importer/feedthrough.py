@@ -32,10 +32,14 @@ def unlisted_dependence(output: ConnectionSpec, source: ConnectionSpec) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TransferOrder:
-    """Connections in the order in which they are moved, and the algebraic loops among them."""
+    """Connections in the order in which they are moved, and the algebraic loops among them.
+
+    The outputs of `unlisted` have no list of dependencies, and are in no circle: they may depend on all inputs.
+    """
 
     connections: tuple[ConnectionSpec, ...]
     loops: tuple[tuple[ConnectionSpec, ...], ...]
+    unlisted: tuple[ConnectionSpec, ...] = ()
 
     def loops_back(self, connection: ConnectionSpec) -> bool:
         """Is the connection part of an algebraic loop?"""
@@ -46,14 +50,20 @@ def order_of(connections: Connections, components: Mapping[str, Component]) -> T
     """Order connections so that each is moved after those that its output depends on directly.
 
     Connections that depend on each other in a circle are an algebraic loop: a strong component of the graph. They have
-    no order among themselves.
+    no order among themselves. An output without a list comes after all inputs of its component, except in a circle.
     """
-    graph = declared_graph(connections, components)
+    graph, undeclared = declared_graph(connections, components), undeclared_graph(connections, components)
     loops = loops_of(graph)
-    ranked = TopologicalSorter(_without_loops(graph, loops)).static_order()
+    ranked = list(TopologicalSorter(_without_loops(graph, loops)).static_order())
+    unlisted = {i for i in graph if undeclared[i] != graph[i]}
+    if unlisted:
+        place = {i: rank for rank, i in enumerate(ranked)}
+        ranked = [i for part in strong_components(undeclared) for i in sorted(part, key=place.__getitem__)]
+        unlisted -= {i for loop in loops_of(undeclared) for i in loop}
     return TransferOrder(
         tuple(connections[i] for i in ranked),
         tuple(tuple(connections[i] for i in loop) for loop in loops),
+        tuple(connections[i] for i in ranked if i in unlisted),
     )
 
 

@@ -65,8 +65,9 @@ class Importer(TrialSteps):
     pairs : sequence of PairSpec
         Bodies that hit each other.
     exchange : str
-        `jacobi`: all inputs have the values of the start of a step. `gauss_seidel`: each component gets the newest
-        outputs of components stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
+        `jacobi`: all inputs have the values of the start of a step, except those of stops and of formulas
+        (`order.fresh_inputs`). `gauss_seidel`: each component gets the newest outputs of components stepped before it.
+        `iterated`: steps are repeated until the inputs at their end agree.
     macro_step : float or "auto"
         Longest communication step, s; "auto": steps follow an estimate of their errors.
     coupling_tolerance : float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
@@ -49,22 +49,31 @@ def stepping_order(
 
 
 def fresh_inputs(
-    order: Sequence[Component], incoming: Mapping[str, Sequence[Transfer]], *, jacobi: bool
+    order: Sequence[Component],
+    incoming: Mapping[str, Sequence[Transfer]],
+    stops: Collection[Component] = (),
+    *,
+    jacobi: bool,
 ) -> dict[str, list[Transfer]]:
     """Return the transfers from components stepped earlier, made just before each component's own step.
 
-    With exchange "jacobi" only a component that answers at once needs them, such as a stop. It has no event mode, and
-    all its outputs depend on its inputs directly (or it has no states).
+    With exchange "jacobi" only two kinds of component need them: the stops of contact ports, and formulas. Neither has
+    event mode. All outputs of a formula depend on inputs directly, by its description, which names no state.
     """
     place = {c.name: i for i, c in enumerate(order)}
 
     def fresh(component: Component) -> list[Transfer]:
         earlier = [t for t in incoming[component.name] if place[t.source.name] < place[component.name]]
-        depends = component.depends.values()
-        answers = not component.event_mode and (not component.has_states or (bool(depends) and all(depends)))
+        answers = not component.event_mode and (component in stops or _is_formula(component))
         return earlier if not jacobi or answers else []
 
     return {c.name: fresh(c) for c in order if c.name in incoming}
+
+
+def _is_formula(component: Component) -> bool:
+    depends = component.depends.values()
+    has_derivatives = any(v.derivative is not None for v in component.variables.values())
+    return bool(depends) and all(depends) and not has_derivatives
 
 
 def _drawing(connections: Sequence[ConnectionSpec]) -> set[str]:

@@ -72,7 +72,8 @@ class StepPlan:
         straight = [t for t in parts.transfers if t not in self.looping]
         together = [c for c in parts.components if not c.on_own_grid]
         incoming = {c.name: [t for t in straight if t.target is c] for c in together}
-        fresh = fresh_inputs(parts.components, incoming, jacobi=self._is_jacobi)
+        stops = [bond.stop for bond in parts.contacts.ports]
+        fresh = fresh_inputs(parts.components, incoming, stops, jacobi=self._is_jacobi)
         refreshed = [t for ts in fresh.values() for t in ts]
         behind = [t for t in parts.transfers if t not in refreshed]
         self.start_moves = moves_of(t for t in behind if t not in self.looping) or None

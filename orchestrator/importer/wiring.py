@@ -298,7 +298,7 @@ def transfers_of(order: TransferOrder, components: dict[str, Component]) -> tupl
     groups: list[list[ConnectionSpec]] = []
     for connection in order.connections:
         alike = [group for group in groups if order.loops_back(group[0]) == order.loops_back(connection)]
-        place = _group_for(connection, alike, components)
+        place = _group_for(connection, alike, components, order)
         if place is None:
             groups.append([connection])
         else:
@@ -322,14 +322,19 @@ def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[
 
 
 def _group_for(
-    connection: ConnectionSpec, groups: list[list[ConnectionSpec]], components: dict[str, Component]
+    connection: ConnectionSpec,
+    groups: list[list[ConnectionSpec]],
+    components: dict[str, Component],
+    order: TransferOrder,
 ) -> list[ConnectionSpec] | None:
     """Return the last group with the same ends, if no transfer since then feeds this connection's output."""
     key = _key(connection, components)
-    needed = components[connection.source[0]].depends.get(connection.source[1], frozenset())
+    source = components[connection.source[0]]
+    listed = source.depends.get(connection.source[1], frozenset())
+    needed = source.variables if connection in order.unlisted else listed
     for group in reversed(groups):
         if _key(group[0], components) == key:
             return group
-        if any(c.target[0] == connection.source[0] and c.target[1] in needed for c in group):
+        if any(c.target[0] == source.name and c.target[1] in needed for c in group):
             return None
     return None

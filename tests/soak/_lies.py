@@ -204,7 +204,9 @@ def _described(source: Path, target: Path, texts: dict[str, str], flags: dict[st
                 for old, new in texts.items():
                     text = text.replace(old, new, 1)
                 content = text.encode()
-            changed.writestr(name, content)
+            changed.writestr(
+                zipfile.ZipInfo(name), content
+            )  # without the time: equal files are unpacked once
     return target
 
 

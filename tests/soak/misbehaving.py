@@ -14,6 +14,7 @@ import psutil  # type: ignore[import-untyped, unused-ignore]
 from support import fmu_factory
 
 from soak import _lies
+from soak._copied_guards import copied_guards
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.guard import guarded as guard
@@ -27,8 +28,8 @@ SECONDS = 30.0
 
 #: Numbers of faults and places in the model descriptions of Faulty; the event fault exists only in FMI 3.0.
 FAULTS, PLACES, ENDLESS_EVENTS, HANGS = range(1, 31), 11, 13, (4, 30)
-#: A million lines in a step take about as long as the deadline.
-FLOODS = (5, 6)
+#: A million lines, or a new process in each call, take about as long as the deadline on a busy machine.
+FLOODS = (5, 6, 21, 22)
 #: Faults with a late effect: a damaged heap, closed files, a killed parent.
 AT_A_DISTANCE = (26, 28, 29)
 MARK = "VIBROIMPACT_SOAK_MARK"
@@ -73,9 +74,10 @@ def check(seed: int) -> str | None:
         deadline=DEADLINE,
     )
     variable = draw.choice([""] * 9 + ["VIBROIMPACT_FAULTY_LOAD", "VIBROIMPACT_FAULTY_INSTANTIATE"])
-    with _environment({MARK: f"{os.getpid()} {seed}"} | ({variable: str(fault)} if variable else {}), fault):
+    values = {MARK: f"{os.getpid()} {seed}"} | ({variable: str(fault)} if variable else {})
+    with copied_guards(), _environment(values, fault):
         problem = _loaded(text) if variable else _tried(text, [0, fault, 0])
-        return problem or _left_behind(f"{os.getpid()} {seed}")
+        return problem or _left_behind(values[MARK])
 
 
 @contextmanager
@@ -173,11 +175,11 @@ def _left_behind(mark: str) -> str | None:
 
 
 def _is_marked(process: psutil.Process, mark: str) -> bool:
+    """Does a process belong to the case, by its environment or (a copy of a warm process) by its folder, and live?"""
+    if process.pid == os.getpid():
+        return False
     try:
-        return (
-            process.pid != os.getpid()
-            and process.environ().get(MARK) == mark
-            and bool(process.status() != psutil.STATUS_ZOMBIE)
-        )
+        is_ours = process.environ().get(MARK) == mark or process.cwd() == os.getcwd()
+        return is_ours and bool(process.status() != psutil.STATUS_ZOMBIE)
     except psutil.Error:
         return False

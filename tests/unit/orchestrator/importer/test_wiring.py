@@ -106,6 +106,30 @@ def test_connections_are_moved_after_those_that_they_depend_on(folder: Path, gai
         component.free()
 
 
+def test_an_output_without_a_list_is_moved_after_all_inputs_of_its_component(folder: Path, gain: Path) -> None:
+    unlisted = fmu_factory.redescribed(gain, folder / "unlisted.fmu", ('index="2" dependencies="1"/>', 'index="2"/>'))
+    parts = {name: Component(part(name, unlisted)) for name in ("a", "b", "c")}
+    links = [link("c.y", "a.u"), link("b.y", "c.u")]
+    assert order_of(links, parts).connections == (links[1], links[0])
+    # a circle has no such order: the importer measures it, and solves it if it is a loop
+    circle = [*links, link("a.y", "b.u")]
+    order = order_of(circle, parts)
+    assert (order.loops, order.unlisted) == ((), ())
+    for component in parts.values():
+        component.free()
+
+
+def test_an_output_without_a_list_is_no_part_of_a_transfer_before_an_input(folder: Path, gain: Path) -> None:
+    lists = 'index="3" dependencies="1 2"', 'index="3"'
+    source = fmu_factory.redescribed(fmu_factory.feedthrough(folder, "2.0"), folder / "half.fmu", lists)
+    parts = {name: Component(part(name, source)) for name in "ab"} | {"c": Component(part("c", gain))}
+    links = [link("a.latched", "b.u"), link("a.y", "b.w"), link("c.y", "a.u")]
+    moved = [t.connections for t in transfers_of(order_of(links, parts), parts)]
+    assert moved.index((links[2],)) < moved.index((links[1],))
+    for component in parts.values():
+        component.free()
+
+
 def test_connections_between_the_same_two_components_are_one_transfer() -> None:
     parts = {name: Component(body(name, {})) for name in ("a", "b")}
     links = [link("a.displacement", "b.force"), link("a.velocity", "b.base_acceleration")]
@@ -403,6 +427,41 @@ def test_jacobi_does_not_depend_on_the_order_of_the_components(made: list[Import
         importer.advance(20.0)
         ends.append(values(importer, "a", "displacement", "velocity"))
     assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_jacobi_gives_inputs_of_the_start_to_bodies_without_saved_states(
+    made: list[Importer], folder: Path, fmi: str
+) -> None:
+    ends = []
+    for states in (True, False):
+        mass = fmu_factory.mass(folder, fmi, states=states)
+        for names in ("ab", "ba"):
+            importer = begun(made, *masses(mass, names), exchange="jacobi", macro_step=0.1)
+            importer.advance(3.0)
+            ends.append([values(importer, name, "x", "v") for name in "ab"])
+    assert all(end == ends[0] for end in ends)
+
+
+def test_jacobi_takes_no_component_as_a_formula_that_names_a_state(
+    made: list[Importer], folder: Path
+) -> None:
+    source = fmu_factory.mass(folder, "3.0", states=False)
+    depends, state = ('dependencies=""', 'dependencies="3"'), ('name="v"', 'name="v" derivative="1"')
+    ends = []
+    for name, changes in (("plain", []), ("formula", [depends]), ("state", [depends, state])):
+        mass = fmu_factory.redescribed(source, folder / f"{name}.fmu", *changes)
+        parts, links = masses(mass, "ab")
+        importer = begun(made, parts, links[:1], exchange="jacobi", macro_step=0.1)
+        importer.advance(3.0)
+        ends.append(values(importer, "b", "x"))
+    assert ends[2] == ends[0] != ends[1]
+
+
+def masses(fmu: Path, names: str) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
+    """Return two masses in the order of their names, a moved by 1, with a force between them."""
+    parts = [part(name, fmu, k=4.0, x=float(name == "a")) for name in names]
+    return parts, [link("a.x", "b.f", 0.5), link("b.x", "a.f", 0.5)]
 
 
 @pytest.mark.parametrize(("exchange", "order"), [("jacobi", 1), ("gauss_seidel", 1), ("iterated", 2)])
