@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
-from typing import Self
+from typing import NoReturn, Self
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
@@ -13,6 +15,27 @@ from vibroimpact.orchestrator.importer.plain_loop import Made
 from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
+
+
+class DiscardedStep(ComponentError):
+    """A component has discarded a step from `start` to `end`, s; `reached` is its last successful time, or NaN."""
+
+    start = end = reached = math.nan
+
+    @property
+    def reason(self) -> str:
+        """The last line that the component logged."""
+        return self.log[-1] if self.log else "the component logged nothing"
+
+
+def refuse_discard(component: Component, start: float, end: float) -> NoReturn:
+    """Raise DiscardedStep for the step from `start` to `end`, s, that a component has just discarded."""
+    instance = component.instance
+    try:
+        instance.fail("DoStep", f"returned discard at time {instance.time:.17g}", DiscardedStep)
+    except DiscardedStep as discard:
+        discard.start, discard.end, discard.reached = start, end, instance.last_successful_time()
+        raise
 
 
 class TrialSteps:

@@ -21,6 +21,7 @@ from vibroimpact.orchestrator.importer.component import SAME_INSTANT
 from vibroimpact.orchestrator.importer.parts import Parts
 from vibroimpact.orchestrator.importer.specification import Exchange, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
+from vibroimpact.orchestrator.importer.trial_steps import DiscardedStep
 
 #: First and shortest size of a step, over the time of a run, and the time in which a motion from rest has no scale.
 FIRST, SHORTEST, WINDOW = 1e-6, 1e-10, 1e-3
@@ -28,6 +29,8 @@ FIRST, SHORTEST, WINDOW = 1e-6, 1e-10, 1e-3
 FIRST_WITH_CONTACTS = 1e-4
 #: Shortest size over the rounding of time.
 TIME_ROUNDINGS = 16.0
+#: A step up to this many times the shortest is a shortest one: ends of steps are rounded.
+SAME_SHORTEST = 1.01
 #: Deviation of a contact point from a straight line over a step, over its scale, at which the step shows its path.
 PATH_TOLERANCE = 1e-2
 #: A step up to this much longer than the first is a first one.
@@ -161,19 +164,59 @@ class AdaptiveSteps:
         importer, controller = self._importer, self._controller
         while True:
             wish = controller.end_of(time, limit)
-            planned = importer.attempt(time, wish)
-            size = importer.reached - time
-            if size <= 0.0:
-                importer.accept(time, planned)
-                return
-            error = self._error_of_halves(time, size)
+            try:
+                planned = importer.attempt(time, wish)
+                size = importer.reached - time
+                error = self._error_of_halves(time, size) if size > 0.0 else (0.0, "")
+            except DiscardedStep as discard:
+                self._shorten(time, discard)
+                continue
             if error[0] <= 1.0:
                 break
             self.record.rejected += 1
             controller.reject(size, error[0])
             self._bound_size(time, size, error)
             importer.take_back()
+        if size <= 0.0:
+            self._accept(time, planned)
+            return
         self._finish(time, planned, error, cut=importer.reached < wish or wish == limit)
+
+    def _shorten(self, time: float, discard: DiscardedStep) -> None:
+        """Go back before a discarded step and choose a shorter one; ComponentError at the shortest."""
+        self.record.rejected += 1
+        size, shortest = discard.end - time, self._shortest(time)
+        if size <= shortest * SAME_SHORTEST:
+            raise ComponentError(
+                f"{discard.instance}: {discard.function}: expected a step of {shortest:.3g} s, the shortest of the run, "
+                f"got a discard at time {discard.start:.12g}: {discard.reason}",
+                instance=discard.instance,
+                function=discard.function,
+                time=discard.start,
+                log=discard.log,
+            )
+        self._importer.take_back()
+        self._controller.discard(size, discard.reached - time)
+        self._controller.size = max(self._controller.size, shortest)
+
+    def _accept(self, time: float, planned: float) -> None:
+        """Conclude a step; ComponentError where a component discards it that cannot go back."""
+        try:
+            self._importer.accept(time, planned)
+        except DiscardedStep as discard:
+            component = self._parts.named[discard.instance]
+            if component.has_states:
+                raise
+            raise ComponentError(
+                f"{discard.instance}: {discard.function}: expected an FMU that can repeat the steps it discards, got one "
+                f"without states (canGetAndSet{component.instance.state_word} = false) that discarded "
+                f"{discard.end - discard.start:.3g} s at time {discard.start:.12g}: {discard.reason}. "
+                "Give a shorter macro step as a number.",
+                instance=discard.instance,
+                function=discard.function,
+                time=discard.start,
+                log=discard.log,
+            ) from None
 
     def _finish(self, time: float, planned: float, error: tuple[float, str], *, cut: bool) -> None:
         """Conclude a step whose error by halves is small, and choose the next size."""
@@ -184,7 +227,7 @@ class AdaptiveSteps:
             self._parts.ticks.are_due(reached),
         )
         coupling_error = error[0]
-        importer.accept(time, planned)
+        self._accept(time, planned)
         if ticks or importer.event_time >= reached:
             self.record.add(size, error[0] * self._tolerance, cut=cut)
             self._controller.begin_anew(may_reject=is_halved)
@@ -227,7 +270,7 @@ class AdaptiveSteps:
         shortest = self._shortest(time)
         if self._controller.size >= shortest:
             return
-        if error[0] > 1.0 and size <= shortest:
+        if error[0] > 1.0 and size <= shortest * SAME_SHORTEST:
             raise ComponentError(
                 f"macro_step: expected an error of at most {self._tolerance:g} of each value in steps of "
                 f"{shortest:.3g} s, got {error[0] * self._tolerance:.3g} of {error[1]} at time {time:.12g}. "
