@@ -122,6 +122,62 @@ class CouplingRun(Structure):
     ]
 
 
+class ChosenStep(Structure):
+    """A step on trial with its estimate; the fields are explained in `door/chosen_step.h`."""
+
+    _fields_ = [
+        ("trial", POINTER(CouplingComponent)),
+        *((name, CouplingCalls) for name in ("moves", "read", "save_end", "restore_end")),
+        *((name, c_void_p) for name in ("at_event", "kept_times", "kept_flags")),
+        *((name, c_int64) for name in ("count", "units")),
+        *((name, c_void_p) for name in ("unit", "known", "since", "rounding", "all_known", "largest")),
+        *((name, c_void_p) for name in ("whole", "before", "halves")),
+        *(
+            (name, c_double)
+            for name in ("window", "tolerance", "share", "rounding_part", "steady", "smallest")
+        ),
+        ("first_size", c_double),
+        ("worst", c_int64),
+        ("error", c_double),
+    ]
+
+
+@cache
+def _chosen_step() -> Any:
+    function = core_library().vi_door_chosen_step
+    function.argtypes = [
+        POINTER(CouplingPlan),
+        POINTER(ChosenStep),
+        POINTER(CouplingProgress),
+        POINTER(CouplingRun),
+    ]
+    return function
+
+
+def try_chosen_step(
+    plan: CouplingPlan, chosen: ChosenStep, progress: CouplingProgress, run: CouplingRun
+) -> CouplingEnd:
+    """Make the step of a run from `start` to `target`, s, and estimate its error by two half steps.
+
+    Parameters
+    ----------
+    plan : CouplingPlan
+        The components and their calls; all have saved states.
+    chosen : ChosenStep
+        Receives the error over the tolerance.
+    progress : CouplingProgress
+        Counts repeated steps.
+    run : CouplingRun
+
+    Returns
+    -------
+    CouplingEnd
+        `reached`: the step can be accepted or taken back. `listen`: all are back at the start, and the caller makes the
+        step. `stepped`, `failed`: a call has returned a bad status.
+    """
+    return CouplingEnd(_chosen_step()(plan, chosen, progress, run))
+
+
 @cache
 def _function() -> Any:
     function = core_library().vi_door_coupling

@@ -61,6 +61,10 @@ class EventfulInstance(Instance):
             self._check_end(reached, end)
         return status
 
+    def last_successful_time(self) -> float:
+        """Return the end of a discarded step: see the base class."""
+        return self._last_time.value
+
     def take_time(self, time: float) -> None:
         """Set the time, s, that steps made and checked by C code have reached."""
         self.time = time

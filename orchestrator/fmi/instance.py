@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double, c_void_p
@@ -323,6 +324,10 @@ class Instance(ABC):
             "step_time": ctypes.addressof(self._step_time),
             "step_size": ctypes.addressof(self._step_size),
         }
+
+    def last_successful_time(self) -> float:
+        """Return the time, s, up to which the FMU says that it made the step just discarded; NaN if it does not say."""
+        return math.nan
 
     def step_undiscarded(self, time: float, size: float) -> None:
         """Advance from `time` by `size`, s; a discarded step is an error."""

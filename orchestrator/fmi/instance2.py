@@ -176,13 +176,22 @@ class Instance2(Instance):
         )
         return status == OK and bool(terminated.value)
 
-    def _reported_end(self, end: float) -> float:
-        """Return the end of a discarded step to `end`, s."""
+    def last_successful_time(self) -> float:
+        """Return the end of a discarded step: see the base class."""
+        status, reached = self._end_of_discarded()
+        return reached if status == OK else math.nan
+
+    def _end_of_discarded(self) -> tuple[int, float]:
+        """Return FMI's status of the question, and the answer, s."""
         reached = c_double(math.nan)
         kind = c_int(LAST_SUCCESSFUL_TIME)
-        self.check(
-            self._function("GetRealStatus")(self._pointer, kind, ctypes.byref(reached)), "GetRealStatus"
-        )
-        if not self._ends_inside(reached.value, end):
-            self._refuse_end("a time of the step", reached.value)
-        return min(reached.value, end)
+        status = self._function("GetRealStatus")(self._pointer, kind, ctypes.byref(reached))
+        return status, reached.value
+
+    def _reported_end(self, end: float) -> float:
+        """Return the end of a discarded step to `end`, s."""
+        status, reached = self._end_of_discarded()
+        self.check(status, "GetRealStatus")
+        if not self._ends_inside(reached, end):
+            self._refuse_end("a time of the step", reached)
+        return min(reached, end)

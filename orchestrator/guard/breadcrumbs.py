@@ -20,6 +20,7 @@ from vibroimpact.orchestrator.fmi.instance import Instance, Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.fmi.log import NO_LINES, RING_SIZE, LogTail
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.adaptive.chosen_loop import ChosenLoop
 from vibroimpact.orchestrator.importer.plain_loop import PlainLoop
 from vibroimpact.orchestrator.importer.wiring import CallList
 
@@ -214,6 +215,8 @@ def _call_in(frame: FrameType) -> tuple[Instance, str, float] | None:
     owner, method = frame.f_locals.get("self"), frame.f_code.co_name
     if isinstance(owner, PlainLoop) and method == "advance":
         return owner.call_under_way()
+    if isinstance(owner, ChosenLoop) and method == "try_step":
+        return owner.plain.call_under_way()
     found = _python_call_in(frame, owner, method)
     return None if found is None else (*found, _time_of(*found))
 

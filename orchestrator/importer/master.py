@@ -37,7 +37,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
 from vibroimpact.orchestrator.importer.stop_contacts.contact_bond import MOST_REPETITIONS
-from vibroimpact.orchestrator.importer.trial_steps import TrialSteps
+from vibroimpact.orchestrator.importer.trial_steps import TrialSteps, refuse_discard
 from vibroimpact.orchestrator.importer.wiring import SettlingInputs
 
 #: Steps without progress after which the run ends in an error.
@@ -398,7 +398,7 @@ class Importer(TrialSteps):
             return self._after_step(component, target)
         status = instance.step(time, target - time) if made is None else instance.take_step(made.status)
         if status == DISCARD:
-            instance.check(status, "DoStep")
+            refuse_discard(component, time, target)
         reached = self._after_step(component, target) if instance.is_flagged else target
         if component.event_times is not None:
             reached = min(reached, self._reported(component, time, target))

@@ -73,6 +73,8 @@ class PlainLoop:
 
     Attributes
     ----------
+    plan : CouplingPlan
+        The calls of all components.
     run : CouplingRun
         The state that the last call has left.
     """
@@ -97,19 +99,19 @@ class PlainLoop:
         own = addressof(self._noted), addressof(self._noted_time)
         notes = components[0].instance.wrap
         noted = (notes.call_address, notes.time_address) if isinstance(notes, CallNotes) else own
-        steps = [self._component(c, i) for c, i in zip(components, inputs, strict=True)]
+        steps = [self.component(c, i) for c, i in zip(components, inputs, strict=True)]
         decisions = [addressof(instance.decisions) for instance in event_mode.instances]
         self._steps = (CouplingComponent * len(steps))(*steps)
         self._stepped = [(c.instance, step) for c, step in zip(components, self._steps, strict=True)]
         self._decisions = (c_void_p * max(1, len(decisions)))(*decisions)
-        self._plan = CouplingPlan(
+        self.plan = CouplingPlan(
             components=self._steps,
             count=len(steps),
             saves=saves,
-            start=self._calls(() if start is None else start.calls),
-            begin=self._calls(event_mode.begin.calls),
-            again=self._calls(event_mode.again.calls),
-            leave=self._calls(event_mode.leave.calls),
+            start=self.calls(() if start is None else start.calls),
+            begin=self.calls(event_mode.begin.calls),
+            again=self.calls(event_mode.again.calls),
+            leave=self.calls(event_mode.leave.calls),
             decisions=self._decisions,
             deciding=len(decisions),
             most_iterations=EVENT_ITERATIONS,
@@ -125,17 +127,20 @@ class PlainLoop:
 
     # ---- the plan ----
 
-    def _component(self, component: Component, inputs: CallList | None) -> CouplingComponent:
+    def component(
+        self, component: Component, inputs: CallList | None, slot: c_void_p | None = None
+    ) -> CouplingComponent:
+        """Return a component by its calls, with a slot for its saved states; None: that of the start of a step."""
         instance = component.instance
         kind = CallKind.step3 if isinstance(instance, EventfulInstance) else CallKind.step2
         times = component.event_times
         reads = [] if times is None else [StatusCall(times.get_call, instance, f"Get{times.name}", times)]
         return CouplingComponent(
             step=self._call(instance, "DoStep", kind=kind),
-            inputs=self._calls(() if inputs is None else inputs.calls),
-            save=self._states(component, "Get", CallKind.save),
-            restore=self._states(component, "Set", CallKind.restore),
-            event_times=self._calls(reads),
+            inputs=self.calls(() if inputs is None else inputs.calls),
+            save=self._states(component, CallKind.save, slot),
+            restore=self._states(component, CallKind.restore, slot),
+            event_times=self.calls(reads),
             event_mode=component.event_mode,
             may_return_early=component.event_mode,
             number=self._numbers[component.name],
@@ -143,18 +148,24 @@ class PlainLoop:
             **instance.step_memory,
         )
 
-    def _states(self, component: Component, verb: str, kind: CallKind) -> CouplingCalls:
+    def _states(self, component: Component, kind: CallKind, slot: c_void_p | None) -> CouplingCalls:
         if not component.has_states:
             return CouplingCalls()
-        name = verb + component.instance.state_word
-        return self._array(
-            [self._call(component.instance, name, kind=kind, values=addressof(component.at_start))]
+        return self.array([self.state_call(component, kind, component.at_start if slot is None else slot)])
+
+    def state_call(self, component: Component, kind: CallKind, slot: c_void_p) -> CouplingCall:
+        """Return the call that saves or restores the state in a slot."""
+        verb = "Get" if kind is CallKind.save else "Set"
+        return self._call(
+            component.instance, verb + component.instance.state_word, kind=kind, values=addressof(slot)
         )
 
-    def _calls(self, calls: Iterable[StatusCall]) -> CouplingCalls:
-        return self._array([self._moved(call) for call in calls])
+    def calls(self, calls: Iterable[StatusCall]) -> CouplingCalls:
+        """Return calls in the form for C code."""
+        return self.array([self._moved(call) for call in calls])
 
-    def _array(self, calls: Sequence[CouplingCall]) -> CouplingCalls:
+    def array(self, calls: Sequence[CouplingCall]) -> CouplingCalls:
+        """Return calls as an array, whose memory this loop keeps."""
         array = (CouplingCall * max(1, len(calls)))(*calls)
         self._kept.append(array)
         return CouplingCalls(array, len(calls))
@@ -225,14 +236,22 @@ class PlainLoop:
         run.wants_to_end, run.events_used = False, 0
         run.events = None if late is None else self._events_address
         run.events_room = 0 if late is None else min(MOST_EVENTS, late.room())
-        for instance, step in self._stepped:
-            step.time, step.only_step = instance.time, instance.only_step
-        came_to = advance_coupled(self._plan, self._progress, run)
-        for instance, step in self._stepped:
-            instance.take_time(step.time)
+        self.give_times()
+        came_to = advance_coupled(self.plan, self._progress, run)
+        self.take_times()
         if late is not None and run.events_used:
             late.report(self._events[: run.events_used])
         return came_to
+
+    def give_times(self) -> None:
+        """Give C code the times and the step sizes of the components."""
+        for instance, step in self._stepped:
+            step.time, step.only_step = instance.time, instance.only_step
+
+    def take_times(self) -> None:
+        """Take the times of the components, s, that C code has reached."""
+        for instance, step in self._stepped:
+            instance.take_time(step.time)
 
     def at_event(self) -> list[Component]:
         """Return the components at an event at the end of the unfinished step."""
@@ -247,6 +266,10 @@ class PlainLoop:
         """Raise the error of the call that failed."""
         instance, function = self._known[self.run.at]
         instance.check(self.run.status, function.replace("FMUstate", "FMUState"))
+
+    def explain_step(self) -> None:
+        """Raise the error of the step that failed."""
+        self._components[self.run.at].instance.take_step(self.run.status)
 
     def call_under_way(self) -> tuple[Instance, str, float] | None:
         """Return the FMU call that C code is in, as another thread sees it, and its time, s, or None."""

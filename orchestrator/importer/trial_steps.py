@@ -2,17 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from copy import copy
-from typing import Self
+from typing import NoReturn, Self
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contacts import ContactBonds
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.loops.solver import LoopSolver
-from vibroimpact.orchestrator.importer.plain_loop import Made
+from vibroimpact.orchestrator.importer.plain_loop import Made, PlainLoop
 from vibroimpact.orchestrator.importer.progress import Progress
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
+
+#: Makes a step between two instants, s; returns false if all components are at its start again.
+TrialInC = Callable[[float, float, Progress], bool]
+
+
+class DiscardedStep(ComponentError):
+    """A component has discarded a step from `start` to `end`, s; `reached` is its last successful time, or NaN."""
+
+    start = end = reached = math.nan
+
+    @property
+    def at(self) -> str:
+        """The component and its function, for messages."""
+        return f"{self.instance}: {self.function}"
+
+    @property
+    def reason(self) -> str:
+        """The last line that the component logged."""
+        return self.log[-1] if self.log else "the component logged nothing"
+
+
+def refuse_discard(component: Component, start: float, end: float) -> NoReturn:
+    """Raise DiscardedStep for the step from `start` to `end`, s, that a component has just discarded."""
+    instance = component.instance
+    try:
+        instance.fail("DoStep", f"returned discard at time {instance.time:.17g}", DiscardedStep)
+    except DiscardedStep as discard:
+        discard.start, discard.end, discard.reached = start, end, instance.last_successful_time()
+        raise
 
 
 class TrialSteps:
@@ -25,6 +57,10 @@ class TrialSteps:
     _progress: Progress
     _at_event: list[Component]
     _reached: float
+    _order: Sequence[Component]
+    _stopper: Component
+    contacts: ContactBonds
+    steps_in_c: bool
 
     def _prepare(self, time: float) -> None:
         raise NotImplementedError
@@ -64,6 +100,20 @@ class TrialSteps:
     def event_time(self) -> float:
         """Time of the last resolved event, s."""
         return float(self._progress.event_time)
+
+    def attempt_in_c(self, loop: PlainLoop, attempt: TrialInC, time: float, target: float) -> bool:
+        """Make a step to `target`, s, and its halves by C code; returns false with all components at its start."""
+        if not (self.steps_in_c and self.contacts.have_no_say):
+            return False
+        if self._plan.start_moves is not None:
+            self._plan.start_moves()
+        for watcher in self.watchers:
+            watcher.before(time)
+        if not attempt(time, target, self._progress):
+            return False
+        self._at_event, self._reached = loop.at_event(), loop.run.reached
+        self._stopper = (self._at_event or self._order)[0]
+        return True
 
     def double(self) -> Self:
         """Return an importer of the same components whose steps leave the results of this one as they are."""

@@ -11,6 +11,7 @@ from support import fmu_factory
 from support.coupled_parts import body, contact, events_of, external, link, part, stop, values
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
 
@@ -29,8 +30,16 @@ def chosen(
     links: Sequence[ConnectionSpec],
     events: Sequence[EventSpec] = (),
     tolerance: float = 1e-4,
+    exchange: str = "gauss_seidel",
 ) -> Importer:
-    importer = Importer(parts, links, events, macro_step="auto", coupling_tolerance=tolerance)
+    importer = Importer(
+        parts,
+        links,
+        events,
+        exchange=exchange,  # type: ignore[arg-type]  # a parameter of tests
+        macro_step="auto",
+        coupling_tolerance=tolerance,
+    )
     assert importer.adaptive is not None
     return importer
 
@@ -143,4 +152,91 @@ def test_model_exchange_is_taken_back_too() -> None:
     exact = 0.5 * (math.cos(2.0 * slow) + math.cos(2.0 * fast))
     assert importer.adaptive is not None
     assert abs(values(importer, "a", "displacement")[0] - exact) < importer.adaptive.record.error
+    importer.free()
+
+
+# ---- steps that an FMU discards ----
+
+#: Schemes of the mass that discard steps above its `inner_step`: with a last successful time, and with a false one.
+DISCARDS, DISCARDS_MUTE = 6, 7
+
+
+def beside(spec: ComponentSpec, source: str, target: str) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
+    """Return a component with unit mass and stiffness beside a body that it moves, and that moves it."""
+    links = [
+        link(f"{spec.name}.{source}", "b.force", 0.1),
+        link("b.displacement", f"{spec.name}.{target}", 0.1),
+    ]
+    return [spec, oscillator("b", displacement_start=1.0)], links
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("scheme", [DISCARDS, DISCARDS_MUTE])
+@pytest.mark.parametrize("exchange", ["gauss_seidel", "iterated"])
+def test_a_discarded_step_is_taken_back_and_made_shorter(
+    folder: Path, fmi: str, scheme: int, exchange: str
+) -> None:
+    longest = 0.013
+    discarding = part("m", fmu_factory.mass(folder, fmi), m=1.0, k=1.0, scheme=scheme, inner_step=longest)
+    parts, links = beside(discarding, "x", "f")
+    importer = chosen(parts, links, tolerance=1e-2, exchange=exchange)
+    sizes: list[float] = []
+    importer.watchers.append(StepWatcher(lambda time: None, lambda time, end: sizes.append(end - time)))
+    importer.begin()
+    importer.advance(2.0)
+    slow, fast = math.sqrt(0.9), math.sqrt(1.1)
+    exact = 0.5 * (math.cos(2.0 * slow) - math.cos(2.0 * fast))
+    assert importer.adaptive is not None
+    record = importer.adaptive.record
+    assert values(importer, "m", "x")[0] == pytest.approx(exact, abs=1e-3)
+    assert 0.4 * longest < max(sizes) <= longest
+    # a size that is known to be discarded is not tried at each step
+    assert 0 < record.rejected < 0.2 * record.steps
+    importer.free()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_step_that_ends_before_its_end_is_followed(folder: Path, fmi: str) -> None:
+    # FMI 3.0 returns early after .1 s; FMI 2.0 discards and says so
+    short = part("f", fmu_factory.faulty(folder, fmi), fault=33, fault_time=0.5)
+    importer = chosen(
+        [short, oscillator("b", displacement_start=1.0)],
+        [link("b.displacement", "f.u"), link("f.y", "b.force", -0.5)],
+        tolerance=0.05,
+    )
+    sizes: list[float] = []
+    importer.watchers.append(StepWatcher(lambda time: None, lambda time, end: sizes.append(end - time)))
+    importer.begin()
+    importer.advance(3.0)
+    assert importer.time == 3.0
+    assert 0.09 < max(sizes[len(sizes) // 2 :]) < 0.1 + 1e-9
+    importer.free()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_fmu_that_discards_every_step_is_named_with_the_instant(folder: Path, fmi: str) -> None:
+    discarding = part("f", fmu_factory.faulty(folder, fmi), fault=3, fault_time=0.5)
+    importer = chosen(*beside(discarding, "y", "u"), tolerance=1e-2)
+    importer.begin()
+    expected = (
+        rf"f: fmi{fmi[0]}DoStep: expected a step of 1e-10 s, .* of the run, got a discard at time 0\.[45]"
+    )
+    with pytest.raises(ComponentError, match=expected) as error:
+        importer.advance(1.0)
+    assert error.value.instance == "f"
+    assert error.value.time == pytest.approx(0.5, abs=1e-6)
+    importer.free()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_discard_without_states_is_refused_by_the_flag(folder: Path, fmi: str) -> None:
+    stateless = fmu_factory.mass(folder, fmi, states=False)
+    importer = chosen(
+        *beside(part("m", stateless, scheme=DISCARDS, inner_step=1e-3), "x", "f"), tolerance=1e-2
+    )
+    importer.begin()
+    with pytest.raises(
+        ComponentError, match=r"m: fmi.DoStep: expected .* without states \(canGetAndSet.*time 0\.0"
+    ):
+        importer.advance(1.0)
     importer.free()

@@ -12,6 +12,10 @@ PRESENT, LAST = 0.7, 0.4
 MOST_SHRINKING, MOST_GROWTH = 0.2, 2.0
 #: Least error over the tolerance that counts: a smaller last error would shorten the next step.
 LEAST_ERROR = 1e-2
+#: Steps after a discarded one that are no longer than its part that is made again.
+WARY_STEPS = 20
+#: Next size over a discarded one where the FMU names no time of the step as successful; largest part otherwise.
+AFTER_DISCARD, LARGEST_PART = 0.5, 1.0 - 1e-6
 #: First size after an event, over the size that errors have last chosen.
 AFTER_EVENT = 0.1
 #: A step this much longer than the chosen size may end at its limit, instead of a very short step before it.
@@ -42,10 +46,12 @@ class StepController:
         self._settled = first
         self._last_error = 1.0
         self._may_grow = True
+        self._ceiling, self._wary_steps = math.inf, 0
 
     def end_of(self, time: float, limit: float) -> float:
         """Return the end of a step from `time`, s, which is at most `limit`."""
-        return limit if limit - time <= STRETCH * self.size else time + self.size
+        stretch = 1.0 if self._wary_steps else STRETCH
+        return limit if limit - time <= stretch * self.size else time + self.size
 
     def accept(self, size: float, error: float, *, cut: bool) -> None:
         """Choose the next size after a step of `size` s with an error over the tolerance.
@@ -57,6 +63,9 @@ class StepController:
         ratio = SAFETY * error ** (-PRESENT * exponent) * self._last_error ** (LAST * exponent)
         most = MOST_GROWTH if self._may_grow else 1.0
         chosen = size * min(max(ratio, MOST_SHRINKING), most)
+        if self._wary_steps:
+            self._wary_steps -= 1
+            chosen = min(chosen, self._ceiling)
         if cut and error <= 1.0:
             self.size = max(self.size, chosen)
             return
@@ -69,6 +78,12 @@ class StepController:
         ratio = SAFETY * error ** (-1.0 / self.order) if math.isfinite(error) else 0.0
         self.size = self._settled = size * max(ratio, MOST_SHRINKING)
         self._may_grow = False
+
+    def discard(self, size: float, made: float) -> None:
+        """Choose a shorter size after a step of `size` s that an FMU has discarded; it names `made` s as successful."""
+        is_part = MOST_SHRINKING * size <= made <= LARGEST_PART * size
+        self.size = self._settled = self._ceiling = made if is_part else AFTER_DISCARD * size
+        self._wary_steps = WARY_STEPS
 
     def begin_anew(self, *, may_reject: bool) -> None:
         """Choose a small size after an event: the first one where no step can be taken back."""

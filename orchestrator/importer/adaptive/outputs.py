@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.described import kind_of
+from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall
 
 Floats = NDArray[np.float64]
 REAL_KINDS = ("Float64", "Float32")
@@ -36,6 +37,18 @@ class Outputs:
         Largest absolute value so far of each.
     since : ndarray, shape (variable,)
         Time from which each has had a value other than 0, s; infinite before.
+    rounding : ndarray, shape (variable,)
+        Difference that counts as rounding.
+    unit, largest : ndarray, shape (variable,) and (unit,)
+        Number of the unit of each, and memory for the largest value of each unit.
+    all_known : ndarray, shape (1,)
+        Time from which all have a scale, s. C code that compares values shares these arrays.
+    window, tolerance : float
+        As given to `begin`.
+    reads : CallList
+        The calls that read all variables.
+    are_float64 : bool
+        All values are double precision in the FMUs, too.
     """
 
     def __init__(self, variables: Iterable[tuple[Component, str, str]]) -> None:
@@ -51,8 +64,16 @@ class Outputs:
             _unit(component, v) or name for component, found in grouped.values() for v, name in found.items()
         ]
         places = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
-        self._unit = np.array([places[unit] for unit in units], dtype=np.intp)
-        self._unit_count = len(places)
+        self.unit = np.array([places[unit] for unit in units], dtype=np.int64)
+        self.largest = np.zeros(len(places))
+        self.known, self.since, self.rounding = (np.zeros(len(units)) for _ in range(3))
+        self.all_known = np.zeros(1)
+        owners = [
+            (component.instance, group)
+            for (component, _), group in zip(grouped.values(), self._groups, strict=True)
+        ]
+        self.reads = CallList(StatusCall(g.get_call, i, f"Get{g.name}", g) for i, g in owners)
+        self.are_float64 = all(group.values.dtype == np.float64 for group in self._groups)
         self.begin(0.0, 1.0)
 
     def __len__(self) -> int:
@@ -64,11 +85,9 @@ class Outputs:
 
         Rounding is at most the tolerance of any scale.
         """
-        self._window, self._tolerance = window, tolerance
-        self.known = np.zeros(len(self.names))
-        self.since = np.full(len(self.names), np.inf)
-        self._rounding = np.zeros(len(self.names))
-        self._all_known = np.inf
+        self.window, self.tolerance = window, tolerance
+        self.known[:] = self.rounding[:] = 0.0
+        self.since[:] = self.all_known[:] = np.inf
 
     def read(self) -> Floats:
         """Return the present values, shape (variable,)."""
@@ -81,15 +100,15 @@ class Outputs:
         if not larger.any():
             return
         self.since[larger & (self.known == 0.0)] = time
-        self._all_known = float(self.since.max()) + self._window
+        self.all_known[0] = self.since.max() + self.window
         self.known[larger] = sizes[larger]
-        largest = np.zeros(self._unit_count)
-        np.maximum.at(largest, self._unit, self.known)
-        self._rounding = ROUNDING * largest[self._unit]
+        self.largest[:] = 0.0
+        np.maximum.at(self.largest, self.unit, self.known)
+        self.rounding[:] = ROUNDING * self.largest[self.unit]
 
     def difference(self, one: Floats, other: Floats) -> Floats:
         """Return the absolute differences beyond rounding; infinite where one value alone is finite."""
-        beyond = np.maximum(np.abs(one - other) - self._rounding, 0.0)
+        beyond = np.maximum(np.abs(one - other) - self.rounding, 0.0)
         if np.isfinite(beyond).all():
             return beyond
         same = (one == other) | (np.isnan(one) & np.isnan(other))
@@ -110,8 +129,8 @@ class Outputs:
         end, size : float
             End and length of the step, s.
         """
-        scale = np.fmax(np.fmax(self.known, np.abs(after)), self._rounding / self._tolerance)
-        if end < self._all_known:
+        scale = np.fmax(np.fmax(self.known, np.abs(after)), self.rounding / self.tolerance)
+        if end < self.all_known[0]:
             slope = np.abs(after - before) / size
             scale = np.fmax(scale, np.where(self.rises(after, end), slope * self._left(end), 0.0))
         ratio = errors / np.fmax(scale, SMALLEST)
@@ -127,7 +146,7 @@ class Outputs:
 
     def _left(self, time: float) -> Floats:
         """Return the rest of the first `window` s of each motion, s."""
-        return np.maximum(self._window - np.maximum(time - self.since, 0.0), 0.0)
+        return np.maximum(self.window - np.maximum(time - self.since, 0.0), 0.0)
 
 
 def _unit(component: Component, name: str) -> str:

@@ -16,7 +16,7 @@ class StepRecord:
     Attributes
     ----------
     steps, rejected : int
-        Steps made, and steps that were taken back for their errors.
+        Steps made, and steps that were taken back: their errors were too large, or an FMU has discarded them.
     smallest, largest : float
         Extreme sizes, s, of steps that neither an event nor a limit has cut; NaN without one.
     error : float

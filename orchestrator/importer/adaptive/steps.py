@@ -12,6 +12,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import NO_STATE_PRIOR_TO_POINT
+from vibroimpact.orchestrator.importer.adaptive.chosen_loop import ChosenLoop, chosen_loop
 from vibroimpact.orchestrator.importer.adaptive.controller import StepController
 from vibroimpact.orchestrator.importer.adaptive.coupling import coupling_sources, halved, points_of
 from vibroimpact.orchestrator.importer.adaptive.extrapolation import Extrapolation
@@ -19,8 +20,10 @@ from vibroimpact.orchestrator.importer.adaptive.outputs import Floats, Outputs
 from vibroimpact.orchestrator.importer.adaptive.record import StepRecord
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT
 from vibroimpact.orchestrator.importer.parts import Parts
+from vibroimpact.orchestrator.importer.plain_loop import PlainLoop
 from vibroimpact.orchestrator.importer.specification import Exchange, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.step_plan import StepPlan
+from vibroimpact.orchestrator.importer.trial_steps import DiscardedStep, TrialInC
 
 #: First and shortest size of a step, over the time of a run, and the time in which a motion from rest has no scale.
 FIRST, SHORTEST, WINDOW = 1e-6, 1e-10, 1e-3
@@ -28,6 +31,8 @@ FIRST, SHORTEST, WINDOW = 1e-6, 1e-10, 1e-3
 FIRST_WITH_CONTACTS = 1e-4
 #: Shortest size over the rounding of time.
 TIME_ROUNDINGS = 16.0
+#: A step up to this many times the shortest is a shortest one: ends of steps are rounded.
+SAME_SHORTEST = 1.01
 #: Deviation of a contact point from a straight line over a step, over its scale, at which the step shows its path.
 PATH_TOLERANCE = 1e-2
 #: A step up to this much longer than the first is a first one.
@@ -43,6 +48,9 @@ class Stepper(Protocol):
 
     def attempt(self, time: float, target: float) -> float:
         """Make a step that may be taken back; returns its planned end, s."""
+
+    def attempt_in_c(self, loop: PlainLoop, attempt: TrialInC, time: float, target: float) -> bool:
+        """Make a step with its halves in C; false: all are at its start again."""
 
     def take_back(self) -> None:
         """Go back to the start of the step."""
@@ -123,6 +131,7 @@ class AdaptiveSteps:
         self._first_part = FIRST_WITH_CONTACTS if points else FIRST
         self._slots = {c.name: c_void_p() for c in plan.saved}
         self.record = StepRecord()
+        self._loop: ChosenLoop | None = None
 
     # ---- a run ----
 
@@ -137,6 +146,15 @@ class AdaptiveSteps:
         self._can_halve = bool(len(self._halved)) and not (self._parts.loops.names and stateless)
         if len(self._restorable.outputs) and (self._parts.contacts or not self._can_halve):
             self._all_lines.append(self._restorable)
+        self._find_loop()
+
+    def _find_loop(self) -> None:
+        """Find the loop in C; moves may have been planned anew, with other calls."""
+        plain = self._plan.plain_loop if self._can_halve else None
+        if plain is None:
+            self._loop = None
+        elif self._loop is None or self._loop.plain is not plain:
+            self._loop = chosen_loop(self._plan, self._halved, self._slots, self._share)
 
     def step(self, time: float, limit: float, end: float) -> None:
         """Make one step of a chosen size.
@@ -161,19 +179,67 @@ class AdaptiveSteps:
         importer, controller = self._importer, self._controller
         while True:
             wish = controller.end_of(time, limit)
-            planned = importer.attempt(time, wish)
-            size = importer.reached - time
-            if size <= 0.0:
-                importer.accept(time, planned)
-                return
-            error = self._error_of_halves(time, size)
+            try:
+                planned, error = self._attempt(time, wish)
+                size = importer.reached - time
+            except DiscardedStep as discard:
+                self._shorten(time, discard)
+                continue
             if error[0] <= 1.0:
                 break
             self.record.rejected += 1
             controller.reject(size, error[0])
             self._bound_size(time, size, error)
             importer.take_back()
+        if size <= 0.0:
+            self._accept(time, planned)
+            return
         self._finish(time, planned, error, cut=importer.reached < wish or wish == limit)
+
+    def _attempt(self, time: float, wish: float) -> tuple[float, tuple[float, str]]:
+        """Make a step towards `wish`, s; return its planned end, and its error with the name of an output."""
+        importer, loop = self._importer, self._loop
+        if loop is not None and importer.attempt_in_c(loop.plain, loop.try_step, time, wish):
+            return wish, loop.error
+        planned = importer.attempt(time, wish)
+        size = importer.reached - time
+        return planned, self._error_of_halves(time, size) if size > 0.0 else (0.0, "")
+
+    def _shorten(self, time: float, discard: DiscardedStep) -> None:
+        """Go back before a discarded step and choose a shorter one; ComponentError at the shortest."""
+        self.record.rejected += 1
+        size, shortest = discard.end - time, self._shortest(time)
+        if size <= shortest * SAME_SHORTEST:
+            raise ComponentError(
+                f"{discard.at}: expected a step of {shortest:.3g} s, the shortest of the run, got a discard at time "
+                f"{discard.start:.12g}: {discard.reason}",
+                instance=discard.instance,
+                function=discard.function,
+                time=discard.start,
+                log=discard.log,
+            )
+        self._importer.take_back()
+        self._controller.discard(size, discard.reached - time)
+        self._controller.size = max(self._controller.size, shortest)
+
+    def _accept(self, time: float, planned: float) -> None:
+        """Conclude a step; ComponentError where a component discards it that cannot go back."""
+        try:
+            self._importer.accept(time, planned)
+        except DiscardedStep as discard:
+            component = self._parts.named[discard.instance]
+            if component.has_states:
+                raise
+            raise ComponentError(
+                f"{discard.at}: expected an FMU that can repeat the steps it discards, got one without states "
+                f"(canGetAndSet{component.instance.state_word} = false) that discarded "
+                f"{discard.end - discard.start:.3g} s at time {discard.start:.12g}: {discard.reason}. "
+                "Give a shorter macro step as a number.",
+                instance=discard.instance,
+                function=discard.function,
+                time=discard.start,
+                log=discard.log,
+            ) from None
 
     def _finish(self, time: float, planned: float, error: tuple[float, str], *, cut: bool) -> None:
         """Conclude a step whose error by halves is small, and choose the next size."""
@@ -184,7 +250,7 @@ class AdaptiveSteps:
             self._parts.ticks.are_due(reached),
         )
         coupling_error = error[0]
-        importer.accept(time, planned)
+        self._accept(time, planned)
         if ticks or importer.event_time >= reached:
             self.record.add(size, error[0] * self._tolerance, cut=cut)
             self._controller.begin_anew(may_reject=is_halved)
@@ -213,6 +279,8 @@ class AdaptiveSteps:
         if self._can_halve:
             self._halved.begin(window, self._tolerance)
             self._halved.learn(time, self._halved.read())
+        if self._loop is not None:
+            self._loop.begin(self._controller.first * (1.0 + SAME_SIZE))
         for line in self._all_lines:
             line.begin(time, window)
 
@@ -227,7 +295,7 @@ class AdaptiveSteps:
         shortest = self._shortest(time)
         if self._controller.size >= shortest:
             return
-        if error[0] > 1.0 and size <= shortest:
+        if error[0] > 1.0 and size <= shortest * SAME_SHORTEST:
             raise ComponentError(
                 f"macro_step: expected an error of at most {self._tolerance:g} of each value in steps of "
                 f"{shortest:.3g} s, got {error[0] * self._tolerance:.3g} of {error[1]} at time {time:.12g}. "

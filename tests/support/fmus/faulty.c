@@ -51,8 +51,11 @@ enum {
     FAULT_KILL_PARENT,
     FAULT_ENDLESS_LOG,
     FAULT_BY_INPUT,
-    FAULT_PENDING
+    FAULT_PENDING,
+    FAULT_SHORT_STEPS
 };
+/* s; the longest step with FAULT_SHORT_STEPS */
+#define LONGEST 0.1
 /* s; a false end of a step, beyond every run */
 #define BEYOND 360000.0
 #define PAST (-1e9)
@@ -309,6 +312,11 @@ step_answer model_step(model *m, double size, void *instance)
         m->reached = m->value[FAULT_TIME] > m->time ? m->value[FAULT_TIME] : half;
         m->value[Y] += (m->reached - m->time) * m->value[U];
         return STEP_ENDS_SHORT;
+    }
+    if (due && (int)m->value[FAULT] == FAULT_SHORT_STEPS && size > LONGEST) {
+        m->reached = m->time + LONGEST;
+        m->value[Y] += LONGEST * m->value[U];
+        return STEP_SHORT;
     }
     const step_answer answer = due ? misbehave(m, end, instance) : STEP_DONE;
     if (answer == STEP_DISCARDS) {

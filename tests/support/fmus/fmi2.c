@@ -335,6 +335,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     case STEP_DISCARDS:
         m->time = time + size / 2;
         return fmi2Discard;
+    case STEP_DISCARDS_MUTE:
+    case STEP_SHORT:
     case STEP_ENDS_SHORT:
     case STEP_SAYS:
         m->time = m->reached;

@@ -335,11 +335,12 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     of(c)->before = *m;
     const step_answer answer = model_step(m, size, c);
     const double share = answer == STEP_STALLS ? 0.0 : answer == STEP_DISCARDS ? 0.5 : 1.0;
-    const bool short_of_end = answer == STEP_ENDS_SHORT || answer == STEP_EVENT_EARLY;
+    const bool is_mute = answer == STEP_DISCARDS_MUTE;
+    const bool short_of_end = answer == STEP_ENDS_SHORT || answer == STEP_EVENT_EARLY || answer == STEP_SHORT || is_mute;
     m->time = short_of_end ? m->reached : share < 1.0 ? time + share * size : time + size;
     *needs_event = (answer == STEP_NEEDS_EVENT || answer == STEP_EVENT_EARLY) && of(c)->event_mode_used;
     *terminates = answer == STEP_TERMINATES || answer == STEP_ENDS_SHORT;
-    *early = answer == STEP_STALLS || answer == STEP_EVENT_EARLY || (answer == STEP_SAYS && m->says_early);
+    *early = answer == STEP_STALLS || answer == STEP_EVENT_EARLY || answer == STEP_SHORT || (answer == STEP_SAYS && m->says_early);
     *last_time = answer == STEP_SAYS || answer == STEP_SOLVER_BEHIND ? m->reached : m->time;
     switch (answer) {
     case STEP_PENDS:
@@ -348,6 +349,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     case STEP_FATAL:
         return fmi3Fatal;
     case STEP_DISCARDS:
+    case STEP_DISCARDS_MUTE:
         return fmi3Discard;
     default:
         return fmi3OK;

@@ -7,7 +7,7 @@
 #include "model.h"
 
 enum { X = 1, V, F, MASS, STIFFNESS, LOAD, SCHEME, INNER_STEP };
-enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER, GRID, CLIPPED, ONE_SIZE };
+enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER, GRID, CLIPPED, ONE_SIZE, DISCARDS, DISCARDS_MUTE };
 
 static const double most_force = 1e6;
 
@@ -74,7 +74,12 @@ step_answer model_step(model *m, double size, void *instance)
 {
     double *x = m->value;
     (void)instance;
-    if (x[SCHEME] == EXACT || x[SCHEME] == CLIPPED) {
+    if ((x[SCHEME] == DISCARDS || x[SCHEME] == DISCARDS_MUTE) && size > x[INNER_STEP]) {
+        flow(x, 0.5 * size);
+        m->reached = -1.0; /* no time of the step */
+        return x[SCHEME] == DISCARDS ? STEP_DISCARDS : STEP_DISCARDS_MUTE;
+    }
+    if (x[SCHEME] == EXACT || x[SCHEME] == CLIPPED || x[SCHEME] >= DISCARDS) {
         flow(x, size);
         return STEP_DONE;
     }

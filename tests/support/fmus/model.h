@@ -41,6 +41,8 @@ typedef enum {
     STEP_TERMINATES,  /* done; asks for the end of the simulation (FMI 2.0: discard, and terminated) */
     STEP_STALLS,      /* the time stays where it is (FMI 3.0: early return, FMI 2.0: discard) */
     STEP_DISCARDS,    /* half of the step is done, then discard */
+    STEP_DISCARDS_MUTE, /* nothing is done; discard, and a false last successful time */
+    STEP_SHORT,       /* done up to `reached` (FMI 3.0: early return, FMI 2.0: discard) */
     STEP_ENDS_SHORT,  /* as STEP_TERMINATES, at `reached` */
     STEP_EVENT_EARLY, /* FMI 3.0: the step has ended at `reached` and asks for event mode */
     STEP_SAYS,        /* done; says that it has ended at `reached` (FMI 2.0: with discard, and terminated) */

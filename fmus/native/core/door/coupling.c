@@ -3,11 +3,12 @@
 #include <float.h>
 #include <math.h>
 
+#include "door/coupling_steps.h"
 #include "door/seconds.h"
 #include "door/status.h"
 
 /* Results of a part of a step, besides VI_COUPLING_*. */
-enum { GO_ON = -1, OVERTAKEN = -2 };
+enum { GO_ON = VI_COUPLING_GO_ON, OVERTAKEN = -2 };
 /* Most repetitions of one step, each up to an earlier event. */
 enum { MOST_REPETITIONS = 1000 };
 
@@ -46,7 +47,7 @@ static int made(const vi_coupling_plan *plan, const vi_coupling_call *c)
     }
 }
 
-static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_coupling_calls *calls)
+int vi_coupling_make(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_coupling_calls *calls)
 {
     for (size_t i = 0; i < calls->count; ++i) {
         const vi_coupling_call *c = &calls->calls[i];
@@ -60,20 +61,20 @@ static int make_all(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_c
     return GO_ON;
 }
 
-static int save_all(const vi_coupling_plan *plan, vi_coupling_run *r)
+int vi_coupling_save(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
     int result = GO_ON;
     for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
-        result = make_all(plan, r, &plan->components[i].save);
+        result = vi_coupling_make(plan, r, &plan->components[i].save);
     }
     return result;
 }
 
-static int restore_all(const vi_coupling_plan *plan, vi_coupling_run *r)
+int vi_coupling_restore(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
     int result = GO_ON;
     for (int32_t i = 0; i < plan->count && result == GO_ON; ++i) {
-        result = make_all(plan, r, &plan->components[i].restore);
+        result = vi_coupling_make(plan, r, &plan->components[i].restore);
     }
     return result;
 }
@@ -164,7 +165,7 @@ static int step_one(const vi_coupling_plan *plan, vi_coupling_run *r, int32_t i,
     }
     if (c->step.kind == VI_CALL_STEP2) {
         c->time = *c->step_time + *c->step_size;
-        const int result = make_all(plan, r, &c->event_times);
+        const int result = vi_coupling_make(plan, r, &c->event_times);
         if (result == GO_ON && c->event_times.count > 0) {
             *reached = reported(plan, c, r, has_event);
         }
@@ -190,7 +191,7 @@ static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_r
     for (int32_t i = 0; i < plan->count; ++i) {
         double reached;
         bool has_event;
-        int result = make_all(plan, r, &plan->components[i].inputs);
+        int result = vi_coupling_make(plan, r, &plan->components[i].inputs);
         if (result == GO_ON) {
             result = step_one(plan, r, i, &reached, &has_event);
         }
@@ -217,7 +218,7 @@ static int step_all(const vi_coupling_plan *plan, vi_coupling_run *r, bool may_r
 }
 
 /* Step all components to the first event of any. */
-static int step_together(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
+int vi_coupling_step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
 {
     r->goal = r->target;
     for (int k = 0; k < MOST_REPETITIONS; ++k) {
@@ -227,7 +228,7 @@ static int step_together(const vi_coupling_plan *plan, vi_coupling_progress *p, 
         }
         p->repeated_steps += 1;
         r->goal = r->reached;
-        result = restore_all(plan, r);
+        result = vi_coupling_restore(plan, r);
         if (result != GO_ON) {
             return result;
         }
@@ -250,9 +251,9 @@ static bool any_decision(const vi_coupling_plan *plan, int which)
 /* Carry values and update discrete states until all components are settled. */
 static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
 {
-    int result = make_all(plan, r, &plan->begin);
+    int result = vi_coupling_make(plan, r, &plan->begin);
     for (int32_t k = 1; result == GO_ON && any_decision(plan, 0); ++k) {
-        result = make_all(plan, r, &plan->again);
+        result = vi_coupling_make(plan, r, &plan->again);
         if (result == GO_ON && k == plan->most_iterations) {
             return VI_COUPLING_ENDLESS;
         }
@@ -260,7 +261,7 @@ static int resolve(const vi_coupling_plan *plan, vi_coupling_run *r)
     if (result == GO_ON && any_decision(plan, 1)) {
         r->wants_to_end = 1;
     }
-    return result == GO_ON ? make_all(plan, r, &plan->leave) : result;
+    return result == GO_ON ? vi_coupling_make(plan, r, &plan->leave) : result;
 }
 
 static void note(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r)
@@ -301,12 +302,12 @@ static int step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupli
 {
     r->start = p->time;
     r->target = p->next_point < r->end ? p->next_point : r->end;
-    int result = make_all(plan, r, &plan->start);
+    int result = vi_coupling_make(plan, r, &plan->start);
     if (result == GO_ON && plan->saves) {
-        result = save_all(plan, r);
+        result = vi_coupling_save(plan, r);
     }
     if (result == GO_ON) {
-        result = step_together(plan, p, r);
+        result = vi_coupling_step(plan, p, r);
     }
     return result == GO_ON ? finish(plan, p, r) : result;
 }

@@ -251,6 +251,7 @@ def test_a_value_that_no_short_step_settles_is_named() -> None:
     importer.begin()
     importer.advance(1e-3)
     assert importer.adaptive is not None
+    importer.steps_in_c = False
     importer.adaptive._halved.difference = lambda one, other: np.full(len(one), 1.0)  # type: ignore[method-assign]
     expected = r"macro_step: expected an error of at most 1e-06 .*, got .* of b.displacement -> a.force at time 0.001"
     with pytest.raises(ComponentError, match=expected):
