@@ -73,6 +73,7 @@ class ExchangeWatch(Structure):
 
     _fields_ = [
         *((name, c_double) for name in ("factor", "offset", "room", "level")),
+        *((name, c_double) for name in ("start", "start_rate", "end", "end_rate")),
         *((name, c_int32) for name in ("value", "rate", "direction", "is_armed")),
         *((name, c_int32) for name in ("is_pressed", "was_pressed", "force")),
         ("law", WatchedLaw),

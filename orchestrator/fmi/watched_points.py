@@ -132,7 +132,7 @@ class WatchedPoints:
     def _bind(self) -> None:
         exchange, directions = self._exchange, [0] * int(self._exchange.indicator_count)
         for watch in self.watches:
-            directions += [watch.direction, -1]
+            directions.append(watch.direction)
         references = np.array(self._references, dtype=np.uint32)
         values, roots = np.zeros(len(references)), np.zeros(len(directions) or 1, dtype=np.intc)
         numbers = np.array(directions or [0], dtype=np.intc)

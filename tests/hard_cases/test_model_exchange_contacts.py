@@ -96,7 +96,7 @@ def test_twenty_impacts_of_a_pendulum_are_exact_to_its_tolerance(folder: Path, f
         assert struck.impulse == pytest.approx(1.9 * struck.closing / (1.0 - 0.5**2), rel=1e-9)
         run.importer.free()
     assert errors[0] > errors[1] > errors[2]
-    assert errors[2] <= 1e-8
+    assert errors[2] <= 8e-9  # s and m/s, after 33 s
 
 
 @given(
@@ -111,7 +111,7 @@ def test_any_ball_bounces_by_the_closed_form(
     exact = ball_impacts(3, restitution, height)
     run = ball(folder, "3.0", restitution, at=mass, x=height)
     run.at(exact[-1][0] + 0.1 * exact[0][0] * restitution**3)
-    assert max(largest_errors(run.impacts, exact)) <= 1e-8
+    assert max(largest_errors(run.impacts, exact)) <= 1e-8 * max(1.0, exact[0][1])
     assert all(
         after[0] == pytest.approx(-restitution * before[0], rel=1e-12)
         for before, after in zip(run.before, run.after, strict=True)
@@ -198,6 +198,25 @@ def test_a_graze_within_one_step_of_the_solver_is_found(
     assert len(run.impacts) == count
     if count:
         assert run.impacts[0][1] == pytest.approx(math.sqrt(-2.0 * over), rel=0.2)
+    run.importer.free()
+
+
+@given(
+    place=st.floats(3.0, 100.0),
+    position=st.floats(0.1, 0.999),
+    speed=st.floats(0.1, 100.0),
+    step=st.floats(0.1, 1000.0),
+    power=st.integers(2, 10),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_lift_that_turns_twice_within_one_step_of_the_solver_meets_its_stop(
+    folder: Path, place: float, position: float, speed: float, step: float, power: int
+) -> None:
+    cam = exchanged(folder, "3.0", "cam", 10.0**-power, at=place, x=0.0, v=speed)
+    parts = [cam, rigid_stop(0.9, position, "upper")]
+    run = run_of(parts, [contact(point=TIP)], macro_step=step).at((2.0 * place + 50.0) / speed)
+    met = (place + (1.0 - math.sqrt(1.0 - position**2)) / position) / speed
+    assert run.impacts[0][0] == pytest.approx(met, rel=1e-6)
     run.importer.free()
 
 

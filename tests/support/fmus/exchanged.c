@@ -40,6 +40,19 @@ answer exchanged_states(exchanged *m, const double states[2])
     return ANSWER_OK;
 }
 
+/* The lift of the cam over its angle: a hollow and a bump beside the angle `at`. */
+static double cam_lift(const exchanged *m)
+{
+    const double off = m->real[X] - m->real[AT];
+    return 2.0 * off / (1.0 + off * off);
+}
+
+static double cam_slope(const exchanged *m)
+{
+    const double off = m->real[X] - m->real[AT], width = 1.0 + off * off;
+    return 2.0 * (1.0 - off * off) / (width * width);
+}
+
 answer exchanged_rates(exchanged *m, double rates[2])
 {
     const bool is_late = m->real[TIME] >= m->real[AT];
@@ -52,6 +65,7 @@ answer exchanged_rates(exchanged *m, double rates[2])
     case LAST_FALL:
     case FALLING: rates[1] = m->real[U] / m->real[AT] - GRAVITY; return ANSWER_OK;
     case PENDULUM: rates[1] = m->real[U] * cos(m->real[X]) - GRAVITY * sin(m->real[X]); return ANSWER_OK;
+    case CAM: rates[1] = m->real[U] * cam_slope(m); return ANSWER_OK;
     case WEAK: rates[1] = fmax(-MOST_FORCE, fmin(MOST_FORCE, m->real[U])) - m->real[X]; return ANSWER_OK;
     case SHORT_RATES: return is_far(m) ? ANSWER_DISCARD : ANSWER_OK;
     case NAN_RATES: rates[1] = is_far(m) ? (double)NAN : rates[1]; return ANSWER_OK;
@@ -189,6 +203,9 @@ double exchanged_slope(const exchanged *m)
 
 double exchanged_real(const exchanged *m, unsigned reference)
 {
+    if (kind_of(m) == CAM && (reference == TIP || reference == TIP_RATE)) {
+        return reference == TIP ? cam_lift(m) : cam_slope(m) * m->real[V];
+    }
     if (reference == TIP || reference == TIP_RATE) {
         return reference == TIP ? sin(m->real[X]) : cos(m->real[X]) * m->real[V];
     }

@@ -34,6 +34,7 @@ enum {
     WEAK, /* takes forces of 1000 N at most */
     LAST_FALL, /* falls, and asks for the end in the event mode after its first impact from outside */
     CLOCKED,          /* clocks: each tick adds 1 to v; a countdown of `at`, lit by the third, stops the mass */
+    CAM,              /* turns uniformly; the tip is its lift 2 s / (1 + s^2), s = x - `at`, which u pushes */
     KINDS
 };
 

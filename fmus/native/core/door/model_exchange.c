@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "door/model_exchange_forces.h"
+#include "door/model_exchange_search.h"
 #include "door/model_exchange_watches.h"
 
 enum { OK = VI_EXCHANGE_OK, DISCARD = VI_EXCHANGE_DISCARD, ERROR = VI_EXCHANGE_ERROR };
@@ -84,7 +85,7 @@ static int derivatives_at(double time, void *states, void *derivatives, void *us
     return answer(e, status, VI_EXCHANGE_DERIVATIVES, rates, e->state_count);
 }
 
-/* The functions whose roots end a step: event indicators, then two of each watch. */
+/* The functions whose roots end a step: event indicators, then one of each watch. */
 static int roots_at(double time, void *states, double *roots, void *user)
 {
     vi_exchange *e = user;
@@ -135,7 +136,7 @@ static int make_solver(vi_exchange *e)
     }
     int flag = c->init(e->solver, derivatives_at, e->time, e->vector);
     flag = flag != 0 ? flag : c->set_tolerances(e->solver, e->tolerance, e->tolerances);
-    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)(e->indicator_count + 2 * e->watch_count), roots_at);
+    flag = flag != 0 ? flag : c->set_roots(e->solver, (int)(e->indicator_count + e->watch_count), roots_at);
     flag = flag != 0 || e->watch_count == 0 ? flag : c->set_directions(e->solver, e->directions);
     flag = flag != 0 ? flag : c->set_linear(e->solver, e->linear, e->matrix);
     flag = flag != 0 ? flag : c->set_user(e->solver, e);
@@ -295,9 +296,11 @@ static int complete_step(vi_exchange *e, bool no_state_prior, bool *event, bool 
 /* Finish a step of CVODE from `before`: its roots, the impulses of stops up to there, and samples. */
 static int after_solver(vi_exchange *e, double before, bool has_roots, bool *root)
 {
-    int status = has_roots ? vi_exchange_judge_roots(e, before, root) : OK;
+    int status = vi_exchange_judge_roots(e, has_roots, root);
+    status = status != OK ? status : vi_exchange_search_step(e, before, has_roots, root);
     status = status != OK ? status : vi_exchange_add_impulses(e, before);
-    if (status == OK && has_roots) {
+    if (status == OK) {
+        e->begins_anew = e->begins_anew || e->meets;
         vi_exchange_change_contacts(e);
     }
     return status != OK ? status : vi_exchange_keep_samples(e, true);

@@ -66,6 +66,8 @@ typedef union {
  * contact, the level is 0, or below the start of a step that begins nearer than `room`. */
 typedef struct {
     double factor, offset, room, level;
+    double start, start_rate, end,
+        end_rate; /* distance of a contact point, m, and its rate, at the ends of a step of CVODE */
     int32_t value, rate; /* places among the watched variables; rate: velocity of a contact point, -1 of a variable */
     int32_t direction;   /* of a variable's crossing: -1 falling, 1 rising, 0 either; a contact has -1 */
     int32_t is_armed;
@@ -88,7 +90,7 @@ typedef struct {
     vi_exchange_watch *watches;              /* [watch_count] */
     const uint32_t *watched;                 /* [watched_count] value references */
     double *values;                          /* [watched_count] */
-    int *roots, *directions;                 /* [indicator_count + 2 watch_count] functions whose roots end steps */
+    int *roots, *directions;                 /* [indicator_count + watch_count] functions whose roots end steps */
     const uint32_t *forces;                  /* [force_count] value references of force inputs */
     double *given;                           /* [force_count] N */
     double *point;                           /* [state_count or 1] states between two steps of CVODE */

@@ -8,12 +8,10 @@
 
 /* Set the levels of contacts for a step that begins at the present point. */
 int vi_exchange_mark_watches(vi_exchange *exchange);
-/* Write two functions of each watch: the distance from its level, and the closing speed of a contact. Each falls
- * through 0 at a meeting, and at a turn of the motion. */
+/* Write a function of each watch: the distance from its level, or the force of a stop that presses. */
 void vi_exchange_watch_roots(const vi_exchange *exchange, double roots[]);
-/* Judge the roots at the end of a step of CVODE from `before`, s: `event` becomes whether one is an event. Where a
- * contact point met its surface, the step ends there. */
-int vi_exchange_judge_roots(vi_exchange *exchange, double before, bool *event);
+/* Judge the roots at the end of a step of CVODE, if it has some: `event` becomes whether one is an event. */
+int vi_exchange_judge_roots(vi_exchange *exchange, bool has_roots, bool *event);
 /* Let the roots of the last step begin and end the forces of stops that yield. */
 void vi_exchange_change_contacts(vi_exchange *exchange);
 /* Forget the touching of contact points that have moved away. */
