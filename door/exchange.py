@@ -29,6 +29,8 @@ def export_fmu(
     enumerations: bool = False,
     model_exchange: bool = False,
     sensitivities: str | None = None,
+    strobes: bool = False,
+    structural: bool = False,
     platform: str | None = None,
 ) -> Path:
     """Write a scene's body, stops and forcing as one FMU for another tool; `vi.fmus.export` writes one component.
@@ -39,7 +41,7 @@ def export_fmu(
         A scene of one body. A swept key has the value in its own table, not the values of the sweep.
     path : path
         FMU file to write.
-    fmi, full, external, enumerations, model_exchange, sensitivities, platform
+    fmi, full, external, enumerations, model_exchange, sensitivities, strobes, structural, platform
         Options of the FMU: see `vibroimpact.fmus.export`.
 
     Returns
@@ -71,6 +73,8 @@ def export_fmu(
         enumerations=enumerations,
         model_exchange=model_exchange,
         sensitivities=sensitivities,
+        strobes=strobes,
+        structural=structural,
         platform=platform,
     )
 

@@ -27,6 +27,8 @@ from vibroimpact.fmus.packaging.description import (
     lean,
     plural,
     with_starts,
+    with_strobes,
+    with_structural,
     with_units,
 )
 from vibroimpact.fmus.packaging.experiment import default_experiment
@@ -65,6 +67,8 @@ def export_fmu(
     enumerations: bool = False,
     model_exchange: bool = False,
     sensitivities: str | None = None,
+    strobes: bool = False,
+    structural: bool = False,
     stop_time: float | None = None,
     platform: str | None = None,
     units: Mapping[str, UnitDefinition] | None = None,
@@ -101,6 +105,11 @@ def export_fmu(
     sensitivities : str, optional
         Parameters, with commas between them, over which outputs have derivatives since the start: further outputs
         `sensitivity.OUTPUT.KEY`, in co-simulation alone.
+    strobes : bool
+        Whether to describe `phase_zero`, an output clock that ticks at forcing phase zero, and the displacement and the
+        velocity at its ticks. FMI 3.0 alone has clocks.
+    structural : bool
+        Whether `modes`, `masses` and `contacts` are structural parameters, which FMI 3.0 alone has.
     stop_time : float, optional
         Default end of a run, s; without it, a time that suits the body's frequencies.
     platform : str, optional
@@ -140,6 +149,9 @@ def export_fmu(
     requested = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in requested.items() if count is not None}
     _check_counts(original, counts)
+    for option, given_option in (("strobes", strobes), ("structural", structural)):
+        if given_option and fmi != "3.0":
+            raise UsageError(f"{full_name}: {option}: expected FMI 3.0 with this option, got FMI {fmi}.")
 
     def members_with(given: Mapping[str, Start]) -> dict[str, bytes]:
         own_starts = _checked_starts(original, given)
@@ -155,6 +167,8 @@ def export_fmu(
             component = lean(
                 component, external=external, enumerations=enumerations, model_exchange=model_exchange
             )
+        component = with_structural(component) if structural else component
+        component = with_strobes(component) if strobes else component
         component = with_units(component, units or {})
         _refuse_starts_beyond(component, own_starts)
         pairs = None
@@ -208,7 +222,7 @@ def _lean_counts(component: ComponentDescription, starts: Mapping[str, Number]) 
         if block in component.repeats
     }
     for variable in component.variables:
-        if variable.counts:
+        if variable.counts and variable.counts not in LEAN_COUNTS:
             counts[variable.counts] = int(starts.get(variable.name, variable.start or 0))
     for variable in component.variables:
         if variable.repeat and variable.name in starts:
@@ -291,7 +305,8 @@ def _expected(component: ComponentDescription, variable: Variable) -> str:
 
 def _refuse_starts_beyond(component: ComponentDescription, starts: Mapping[str, Number]) -> None:
     """Raise UsageError for start values of variables that the description leaves out, or beyond its sizes."""
-    most = {v.name: math.inf if v.maximum is None else v.maximum for v in component.variables}
+    shown = (v for v in component.variables if v.versions)
+    most = {v.name: math.inf if v.maximum is None else v.maximum for v in shown}
     more = "Ask for more of them, for external ports, or for the full description."
     for name, start in starts.items():
         if name not in most:

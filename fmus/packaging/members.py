@@ -32,6 +32,8 @@ from vibroimpact.fmus.shipped import component_folder, fmu_path
 
 #: Member with the number of each repeated block in the description, in lines like `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
+#: Line of that member by which the library knows that the description has the clock of the strobes.
+STROBES_LINE = "strobes 1\n"
 #: Member with the value reference behind each reference of the description, from 1 on; its format is in resources.h.
 REFERENCES_MEMBER = "resources/references.txt"
 #: Path of the icon for each version of FMI.
@@ -89,15 +91,18 @@ def members_of(contents: Contents) -> dict[str, bytes]:
         members = {member: archive.read(member) for member in archive.namelist()}
     own = next(content for member, content in members.items() if member.startswith("binaries/"))
     resources = dict(contents.resources)
-    if contents.counts:
-        lines = (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
-        resources[SIZES_MEMBER] = "".join((*lines, *_hidden_laws(contents))).encode("ascii")
+    sizes = "".join(_sizes(contents))
+    strobes = STROBES_LINE if any(v.type == "Clock" for v in contents.component.variables_of(3)) else ""
+    if sizes or strobes:
+        resources[SIZES_MEMBER] = (sizes + strobes).encode("ascii")
     component = contents.component
     if fmi == "3.0" and (contents.edition is not None or resources):
         resources[REFERENCES_MEMBER], component = _numbered(component)
     # the trial runs by FMI 3.0, where the token of an export announces a list of references
     trial_token = original.token if fmi == "2.0" else _own_token(original.token, resources)
-    trial = tried(replace(component, token=trial_token), own, resources, contents.experiment)
+    # no step of the trial ends at a strobe
+    plain = {**resources, SIZES_MEMBER: sizes.encode("ascii")} if strobes else resources
+    trial = tried(replace(component, token=trial_token), own, plain, contents.experiment)
     component = replace(component, token=_own_token(original.token, resources))
     for warning in trial.warnings:
         contents.note(f"{component.name}: {warning}")
@@ -112,11 +117,16 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     return members | resources
 
 
-def _hidden_laws(contents: Contents) -> Iterator[str]:
-    """Yield the line that limits the laws in messages to those of the description."""
+def _sizes(contents: Contents) -> Iterator[str]:
+    """Yield the lines of the sizes; one limits the laws in messages to those of the description."""
+    if not contents.counts:
+        return
+    yield from (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
     ports = {v.ports for v in contents.component.variables if v.repeat == "contact"}
     if "external" in {v.ports for v in contents.original.variables} - ports:
         yield "external_laws 0\n"
+    if any(v.causality == "structuralParameter" for v in contents.component.variables):
+        yield "structural 1\n"
 
 
 def _for_people(

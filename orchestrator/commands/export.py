@@ -25,6 +25,8 @@ def export_to_file(options: ExportFmu) -> None:
         "enumerations": options.enumerations,
         "model_exchange": options.model_exchange,
         "sensitivities": options.sensitivities,
+        "strobes": options.strobes,
+        "structural": options.structural,
     }
     given = [
         f"--{name.replace('_', '-')}"

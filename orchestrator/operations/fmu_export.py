@@ -79,6 +79,21 @@ class ExportFmu(Operation):
             "stop[1].restitution,forcing.amplitude; for co-simulation alone.",
         ),
     ] = None
+    strobes: Annotated[
+        bool,
+        Option(
+            "--strobes",
+            help="FMI 3.0: add the output clock phase_zero, which ticks at forcing phase zero, with displacement and "
+            "velocity there.",
+        ),
+    ] = False
+    structural: Annotated[
+        bool,
+        Option(
+            "--structural",
+            help="FMI 3.0: make modes, masses and contacts structural parameters, which are set in configuration mode.",
+        ),
+    ] = False
     platform: Annotated[
         str | None,
         Option(

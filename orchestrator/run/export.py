@@ -25,6 +25,8 @@ def export_scene(
     enumerations: bool = False,
     model_exchange: bool = False,
     sensitivities: str | None = None,
+    strobes: bool = False,
+    structural: bool = False,
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
@@ -38,7 +40,7 @@ def export_scene(
         File to write.
     fmi : str
         `3.0` or `2.0`.
-    full, external, enumerations, model_exchange, sensitivities, platform, note
+    full, external, enumerations, model_exchange, sensitivities, strobes, structural, platform, note
         See `vibroimpact.fmus.export`.
 
     Returns
@@ -84,6 +86,8 @@ def export_scene(
         enumerations=enumerations,
         model_exchange=model_exchange,
         sensitivities=sensitivities,
+        strobes=strobes,
+        structural=structural,
         stop_time=_duration(scene),
         platform=platform,
         note=note,

@@ -16,21 +16,23 @@
 #include "body/modal/variation.h"
 #include "body/step.h"
 
-enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
+enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2, VI_CLOCK = 3 };
 
-/* VI_SENSITIVITY: a derivative since the start, which is no variable of the table and is read only. */
+/* VI_SENSITIVITY: a derivative since the start, which is no variable of the table and is read only. VI_SET_STRUCTURAL: a
+ * number of blocks, which a description of FMI 3.0 may have as a structural parameter; else as VI_SET_INITIAL. */
 enum {
     VI_READ_ONLY = 0,
     VI_SET_INITIAL = 1,
     VI_SET_TUNABLE = 2,
     VI_SET_INPUT = 3,
     VI_SET_STATE = 4,
-    VI_SENSITIVITY = 5
+    VI_SENSITIVITY = 5,
+    VI_SET_STRUCTURAL = 6
 };
 
 /* One variable; its value reference is its index in the table. */
 typedef struct {
-    uint8_t type;   /* VI_FLOAT64, VI_INT64 (enumerations too) or VI_BOOLEAN (stored as int32_t) */
+    uint8_t type;   /* VI_FLOAT64, VI_INT64 (enumerations too), VI_BOOLEAN or VI_CLOCK (both stored as int32_t) */
     uint8_t access; /* states in which it may be set */
     uint32_t count; /* number of elements: 1, or the product of the dimensions */
     uint32_t offset; /* in the component's struct, bytes */
@@ -121,6 +123,12 @@ typedef struct {
     bool (*event_pending)(const void *self);
     /* Does this set-up need event mode (an external contact law)? NULL: never. */
     bool (*needs_events)(const void *self);
+    /* For a component with an output clock; otherwise all three are NULL. Is its clock to tick at the present instant? */
+    bool (*clock_is_due)(const void *self);
+    /* Event mode begins: let a due clock tick. Returns how late it ticks, s: 0 at its own instant. */
+    double (*tick)(void *self);
+    /* The discrete states are updated: no clock ticks. Returns the time of the next tick, s; infinite: there is none. */
+    double (*next_tick)(void *self);
     /* Present time, s; NULL: the variable `time` holds it. */
     double (*time)(const void *self);
     /* Bytes of `self` in use, so that a saved state holds no unused rows of the record; NULL: all bytes. */

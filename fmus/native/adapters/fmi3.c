@@ -143,6 +143,21 @@ void fmi3FreeInstance(fmi3Instance instance)
     vi_instance_free(instance);
 }
 
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
+{
+    static const char function[] = "fmi3EnterConfigurationMode";
+    vi_instance *it = instance;
+    if (it != NULL && !it->structural) {
+        return status(vi_instance_fail(it, function, "expected an FMU with structural parameters, got one without"));
+    }
+    return status(vi_instance_enter(it, function, VI_MODE_INSTANTIATED, VI_MODE_CONFIGURATION));
+}
+
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
+{
+    return status(vi_instance_enter(instance, "fmi3ExitConfigurationMode", VI_MODE_CONFIGURATION, VI_MODE_INSTANTIATED));
+}
+
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
@@ -171,6 +186,17 @@ static bool events_are_handled(vi_instance *it, const char *function)
                             it->event_mode_used ? "true" : "false", it->early_return_allowed ? "true" : "false");
 }
 
+/* Event mode begins: clocks tick. */
+static void enter_events(vi_instance *it, const char *function)
+{
+    it->mode = VI_MODE_EVENT;
+    const double late = vi_this_component.tick != NULL ? vi_this_component.tick(it->self) : 0.0;
+    if (late > 0.0) {
+        vi_instance_warn(it, function, "expected event mode at nextEventTime, got it %.17g s later: the clock ticks now",
+                         late);
+    }
+}
+
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
     static const char function[] = "fmi3ExitInitializationMode";
@@ -179,7 +205,16 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
         || !vi_instance_initialize(it, function)) {
         return fmi3Error;
     }
-    it->mode = it->event_mode_used || it->exchange ? VI_MODE_EVENT : VI_MODE_STEP;
+    if (!it->event_mode_used && !it->exchange) {
+        it->mode = VI_MODE_STEP;
+        return fmi3OK;
+    }
+    if (!it->exchange && !it->early_return_allowed && vi_this_component.next_tick != NULL
+        && isfinite(vi_this_component.next_tick(it->self))) {
+        vi_instance_warn(it, function, "earlyReturnAllowed = false: the clock ticks only where a step ends at"
+                                       " nextEventTime");
+    }
+    enter_events(it, function);
     return fmi3OK;
 }
 
@@ -192,7 +227,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
     if (!it->event_mode_used && !it->exchange) {
         return status(vi_instance_fail(it, "fmi3EnterEventMode", "the instance was made with eventModeUsed = false"));
     }
-    it->mode = VI_MODE_EVENT;
+    enter_events(it, "fmi3EnterEventMode");
     return fmi3OK;
 }
 
@@ -256,9 +291,21 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                     "fmi3DoStep: expected a step whose end can be computed in a minute or so. Ask for shorter steps");
         return fmi3Discard;
     }
-    *eventHandlingNeeded = result == VI_STEP_CONTACT;
+    *eventHandlingNeeded = result == VI_STEP_CONTACT
+                           || (it->event_mode_used && vi_this_component.clock_is_due != NULL
+                               && vi_this_component.clock_is_due(it->self));
     *earlyReturn = result != VI_STEP_DONE && *lastSuccessfulTime < end;
     return fmi3OK;
+}
+
+/* End the present ticks, and tell when the next one comes. */
+static void expect_tick(vi_instance *it, bool *defined, double *time)
+{
+    const double next = vi_this_component.next_tick != NULL ? vi_this_component.next_tick(it->self) : HUGE_VAL;
+    if (isfinite(next)) {
+        *defined = true;
+        *time = next;
+    }
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
@@ -278,7 +325,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *nextEventTimeDefined = false;
     *nextEventTime = 0.0;
     if (it->exchange) {
-        return status(vi_instance_handle_event(it, function, valuesOfContinuousStatesChanged, terminateSimulation));
+        const bool good = vi_instance_handle_event(it, function, valuesOfContinuousStatesChanged, terminateSimulation);
+        expect_tick(it, nextEventTimeDefined, nextEventTime);
+        return status(good);
     }
     const bool has_events = vi_this_component.resolve != NULL;
     *valuesOfContinuousStatesChanged = has_events && vi_this_component.event_pending(it->self);
@@ -287,6 +336,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
         return status(vi_instance_fail(it, function, "%s", it->message));
     }
     it->outputs_stale = true;
+    expect_tick(it, nextEventTimeDefined, nextEventTime);
     return fmi3OK;
 }
 
@@ -344,6 +394,14 @@ GETTER(Int64, fmi3Int64, VI_INT64, read_int64)
 SETTER(Int64, fmi3Int64, VI_INT64, write_int64)
 GETTER(Boolean, fmi3Boolean, VI_BOOLEAN, read_boolean)
 SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
+
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Clock values[])
+{
+    return status(instance != NULL && (nValueReferences == 0 || (valueReferences != NULL && values != NULL))
+                  && vi_instance_get(instance, "fmi3GetClock", VI_CLOCK, valueReferences, nValueReferences, values,
+                                     nValueReferences, read_boolean));
+}
 
 /* ---- derivatives ---- */
 

@@ -51,12 +51,6 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetBinary");
 }
 
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        fmi3Clock values[])
-{
-    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetClock");
-}
-
 fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                         const fmi3Clock values[])
 {
@@ -76,8 +70,6 @@ UNAVAILABLE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3Valu
 UNAVAILABLE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent,
             size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
             size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-UNAVAILABLE(fmi3EnterConfigurationMode, fmi3Instance instance)
-UNAVAILABLE(fmi3ExitConfigurationMode, fmi3Instance instance)
 UNAVAILABLE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
             size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
 UNAVAILABLE(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],

@@ -200,6 +200,9 @@ bool vi_instance_describe(vi_instance *instance, const char *function, const cha
         return false;
     }
     vi_sizes_read(folder, &instance->sizes);
+    for (int i = 0; i < instance->sizes.count; ++i) {
+        instance->structural = instance->structural || strcmp(instance->sizes.of[i].block, "structural") == 0;
+    }
     instance->starts = calloc(description->variable_count, sizeof(vi_start));
     if (instance->starts == NULL) {
         return vi_instance_fail(instance, function, "out of memory");
@@ -229,6 +232,7 @@ static const char *mode_name(vi_mode_of_use mode)
     case VI_MODE_TERMINATED: return "terminated";
     case VI_MODE_FAILED: return "failed";
     case VI_MODE_CONTINUOUS: return "continuous-time mode";
+    case VI_MODE_CONFIGURATION: return "configuration mode";
     }
     return "unknown";
 }
@@ -374,6 +378,21 @@ static bool may_set_states(const vi_instance *instance)
     return instance->exchange && instance->mode == VI_MODE_CONTINUOUS;
 }
 
+/* Structural parameters belong to configuration mode. Tools that know none set them as other parameters before
+ * initialization, so the instance takes them there, too, and says so. */
+static bool may_configure(vi_instance *instance, const char *function, uint32_t reference)
+{
+    if (instance->mode == VI_MODE_INSTANTIATED) {
+        vi_instance_warn(instance, function, "value reference %lu is a structural parameter: expected configuration mode,"
+                         " got it without. It was set all the same", (unsigned long)reference);
+    } else if (instance->mode != VI_MODE_CONFIGURATION) {
+        return vi_instance_fail(instance, function, "value reference %lu is a structural parameter, and can be set before"
+                                " initialization only: the instance is %s", (unsigned long)reference,
+                                mode_name(instance->mode));
+    }
+    return true;
+}
+
 static bool may_set(vi_instance *instance, const char *function, const vi_variable *variable, uint32_t reference)
 {
     if (variable->access == VI_SET_STATE && may_set_states(instance)) {
@@ -382,7 +401,11 @@ static bool may_set(vi_instance *instance, const char *function, const vi_variab
     if (variable->access == VI_READ_ONLY || variable->access == VI_SET_STATE || variable->access == VI_SENSITIVITY) {
         return vi_instance_fail(instance, function, "value reference %lu cannot be set", (unsigned long)reference);
     }
-    const int modes = variable->access == VI_SET_INITIAL ? VI_BEFORE_START : VI_BEFORE_START | VI_RUNNING;
+    if (variable->access == VI_SET_STRUCTURAL && instance->structural) {
+        return may_configure(instance, function, reference);
+    }
+    const bool initial = variable->access == VI_SET_INITIAL || variable->access == VI_SET_STRUCTURAL;
+    const int modes = initial ? VI_BEFORE_START : VI_BEFORE_START | VI_RUNNING;
     if (((int)instance->mode & modes) == 0) {
         return vi_instance_fail(instance, function, "value reference %lu cannot be set: the instance is %s",
                                 (unsigned long)reference, mode_name(instance->mode));

@@ -16,11 +16,12 @@ typedef enum {
     VI_MODE_EVENT = 8,
     VI_MODE_TERMINATED = 16,
     VI_MODE_FAILED = 32,
-    VI_MODE_CONTINUOUS = 64
+    VI_MODE_CONTINUOUS = 64,
+    VI_MODE_CONFIGURATION = 128
 } vi_mode_of_use;
 
 enum {
-    VI_ANY_MODE = 127,
+    VI_ANY_MODE = 255,
     VI_BEFORE_START = VI_MODE_INSTANTIATED | VI_MODE_INITIALIZATION,
     VI_RUNNING = VI_MODE_STEP | VI_MODE_EVENT | VI_MODE_CONTINUOUS
 };
@@ -33,6 +34,7 @@ struct vi_instance {
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
     bool exchange;         /* made for model exchange: the importer integrates the component */
+    bool structural;       /* the description has the numbers of blocks as structural parameters */
     bool wants_to_end;     /* the last step asked for the end of the simulation */
     double start_time, stop_time; /* stop_time: infinite if the importer defines none */
     char *name;

@@ -51,7 +51,7 @@ static void defaults(void *self)
     vi_body *c = vi_body_of(self);
     form->defaults(self);
     c->contact_tolerance = DEFAULT_TOLERANCE;
-    c->contacts_described = VI_PORTS;
+    c->contacts_used = c->contacts_described = VI_PORTS;
     for (int k = 0; k < VI_PORTS; ++k) {
         c->contacts[k].side = VI_SIDE_UPPER;
         c->contacts[k].law.restitution = 1.0;
@@ -68,10 +68,13 @@ static void sized(void *self, const char *block, int count)
         form->sized(self, block, count);
     }
     if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_PORTS) {
-        c->contacts_described = count;
+        c->contacts_used = c->contacts_described = count;
     }
     if (strcmp(block, "external_laws") == 0) {
         c->external_hidden = count == 0;
+    }
+    if (strcmp(block, "strobes") == 0) {
+        c->strobe.described = count > 0;
     }
 }
 
@@ -321,14 +324,28 @@ static bool start(void *self, vi_body *c, double start_time, char *message)
     return message[0] == '\0';
 }
 
+/* Contacts beyond those in use have no law. */
+static bool use_contacts(vi_body *c, char *message)
+{
+    if (c->contacts_used < 0 || c->contacts_used > c->contacts_described) {
+        vi_complain(message, "contacts: expected 0 to %d, got %lld", c->contacts_described, (long long)c->contacts_used);
+        return false;
+    }
+    for (int64_t k = c->contacts_used; k < VI_PORTS; ++k) {
+        c->contacts[k].law.law = 0;
+    }
+    return true;
+}
+
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     vi_body *c = vi_body_of(self);
-    if (!form->prepare(self, message) || !start(self, c, start_time, message)) {
+    if (!use_contacts(c, message) || !form->prepare(self, message) || !start(self, c, start_time, message)) {
         return false;
     }
     hold_inputs(self, c);
     update_outputs(self);
+    vi_strobe_start(c);
     if (form->warn != NULL) {
         form->warn(self, message);
     }
@@ -413,9 +430,11 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         }
         hold_inputs(self, c);
     }
+    const bool early = vi_strobe_ends_step(c, request, &target);
     const vi_step_result result = advance(c, target, request, message);
     update_outputs(self);
-    return result;
+    vi_strobe_pass(c, request);
+    return early && result == VI_STEP_DONE ? VI_STEP_STROBE : result;
 }
 
 static bool event_pending(const void *self)
@@ -425,12 +444,36 @@ static bool event_pending(const void *self)
 
 static bool needs_events(const void *self)
 {
-    for (int k = 0; k < VI_PORTS; ++k) {
+    for (int k = 0; k < VI_PORTS && k < const_body_of(self)->contacts_used; ++k) {
         if (vi_contact_law_asks(const_body_of(self)->contacts[k].law.law)) {
             return true;
         }
     }
     return false;
+}
+
+/* ---- the clock of the strobes ---- */
+
+static bool clock_is_due(const void *self)
+{
+    return vi_strobe_is_due(const_body_of(self));
+}
+
+static double tick(void *self)
+{
+    vi_body *c = vi_body_of(self);
+    if (!vi_strobe_is_due(c)) {
+        c->strobe.ticks = 0;
+        return 0.0;
+    }
+    update_outputs(self);
+    return vi_strobe_tick(c);
+}
+
+static double next_tick(void *self)
+{
+    vi_body_refresh_inputs(self); /* a tuned frequency moves the tick */
+    return vi_strobe_next(vi_body_of(self));
 }
 
 /* Bytes of `pressed`, `scan`, `power` and `signals`, the last members. */
@@ -454,6 +497,9 @@ const vi_component vi_this_component = {
     .resolve = resolve,
     .event_pending = event_pending,
     .needs_events = needs_events,
+    .clock_is_due = clock_is_due,
+    .tick = tick,
+    .next_tick = next_tick,
     .time = present_time,
     .used_size = used_size,
     .cache_size = CACHES,

@@ -15,9 +15,10 @@
 #include "body/modal/structure/exchange.h"
 #include "body/modal/structure/structure.h"
 #include "body_sensitivities.h"
+#include "body_strobe.h"
 #include "component.h"
 
-typedef struct {
+struct vi_body {
     /* parameters; impact_limit is in `model`, the contacts' are in `contacts` */
     double contact_tolerance;
     double forcing_angular_frequency, forcing_phase;
@@ -32,8 +33,10 @@ typedef struct {
     double energy_kinetic, energy_potential;
     double natural[VI_MODES], modal_energy[VI_MODES];
     double modal_acceleration[VI_MODES]; /* kg^(1/2) m/s^2 */
+    int64_t contacts_used;      /* number of ports that may have a law */
     int32_t contacts_described; /* number of ports in the model description */
     int32_t external_hidden; /* the model description lacks the laws that another component answers */
+    vi_strobe strobe;
     vi_structure_model model;
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
@@ -45,7 +48,7 @@ typedef struct {
     vi_scan scan;
     vi_power_tables power;
     vi_signal_loads signals;
-} vi_body;
+};
 
 /* The functions and references of one component; `self` is its struct. */
 typedef struct {

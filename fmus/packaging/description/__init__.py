@@ -5,7 +5,15 @@ README come from the same file. The folder imports the standard library only: th
 """
 
 from vibroimpact.fmus.packaging.description.c_header import c_header, header_name
-from vibroimpact.fmus.packaging.description.lean import Edition, Experiment, lean, with_starts, with_units
+from vibroimpact.fmus.packaging.description.lean import (
+    Edition,
+    Experiment,
+    lean,
+    with_starts,
+    with_strobes,
+    with_structural,
+    with_units,
+)
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
@@ -42,6 +50,8 @@ __all__ = [
     "terminals",
     "unit_definitions",
     "with_starts",
+    "with_strobes",
+    "with_structural",
     "with_table",
     "with_units",
 ]

@@ -7,7 +7,10 @@ from collections.abc import Set as AbstractSet
 
 from vibroimpact.fmus.packaging.description.model import ComponentDescription, Variable
 
-C_TYPES = {"Float64": "VI_FLOAT64", "Int64": "VI_INT64", "Boolean": "VI_BOOLEAN", "Enumeration": "VI_INT64"}
+C_TYPES = {
+    **{"Float64": "VI_FLOAT64", "Int64": "VI_INT64", "Boolean": "VI_BOOLEAN"},
+    **{"Enumeration": "VI_INT64", "Clock": "VI_CLOCK"},
+}
 
 
 def header_name(component: ComponentDescription) -> str:
@@ -72,6 +75,8 @@ def _row(component: ComponentDescription, variable: Variable, states: AbstractSe
 def _access(variable: Variable, states: AbstractSet[str]) -> str:
     if variable.name in states:
         return "VI_SET_STATE"
+    if variable.counts:
+        return "VI_SET_STRUCTURAL"
     if variable.causality == "input":
         return "VI_SET_INPUT"
     if variable.causality == "parameter" and variable.variability == "tunable":

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
@@ -16,6 +17,9 @@ from vibroimpact.fmus.packaging.description.model import (
     UnitDefinition,
     Variable,
 )
+
+#: Ports of the clock of the strobes and of its variables.
+STROBES = "strobes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +68,42 @@ def lean(
         enumerations=tuple(types.values()) if enumerations else (),
         variables=tuple(kept),
     )
+
+
+def with_structural(component: ComponentDescription) -> ComponentDescription:
+    """Return a component with its numbers of modes, masses and contacts as structural parameters (FMI 3.0).
+
+    Raises
+    ------
+    UsageError
+        The component has no such number.
+    """
+    _expect_option(component, "structural", any(v.counts for v in component.variables))
+    counted = (
+        replace(v, causality="structuralParameter", versions=(3,)) if v.counts else v for v in component.variables
+    )
+    return replace(component, variables=tuple(counted))
+
+
+def with_strobes(component: ComponentDescription) -> ComponentDescription:
+    """Return a component with the clock of the strobes and its variables (FMI 3.0).
+
+    Raises
+    ------
+    UsageError
+        The component has no forcing.
+    """
+    _expect_option(component, STROBES, any(v.ports == STROBES for v in component.variables))
+    shown = (replace(v, versions=(3,)) if v.ports == STROBES else v for v in component.variables)
+    return replace(component, variables=tuple(shown))
+
+
+def _expect_option(component: ComponentDescription, option: str, there: bool) -> None:
+    if not there:
+        raise UsageError(
+            f"{component.name}: {option}: expected a body with it (Oscillator, Chain, Beam, Structure), got another "
+            "component. Leave the option out."
+        )
 
 
 def with_starts(component: ComponentDescription, starts: Mapping[str, Number]) -> ComponentDescription:

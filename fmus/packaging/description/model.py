@@ -101,11 +101,14 @@ class Variable:
     counts: str = ""
     """Name of the block whose number in use the variable holds (`mode`); an export starts it with that number."""
     ports: str = ""
-    """User of the variable: this package's `importer`, an `external` tool that answers contacts; empty: everybody."""
+    """User of the variable: this package's `importer`, an `external` tool that answers contacts; empty: everybody.
+    `strobes` and `structural` are options of an export, without which no version of FMI has the variable."""
     derivative: str = ""
     """Name of the continuous state whose derivative the variable is, in model exchange."""
     event_indicator: bool = False
     """Whether a change of its sign marks an event, in model exchange."""
+    clock: str = ""
+    """Name of the clock at whose ticks alone the variable changes."""
     shown_name: str = ""
     shown_description: str = ""
     """`shown_name` and `shown_description` are for a reader: with the letter k in place of the index."""
@@ -118,8 +121,9 @@ class Variable:
     @property
     def is_initial_unknown(self) -> bool:
         """Whether ModelStructure lists the variable among the unknowns of initialization."""
-        calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"}
-        return calculated_output or bool(self.derivative) or self.causality == "calculatedParameter"
+        calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"} and not self.clock
+        calculated = calculated_output or self.causality == "calculatedParameter"
+        return calculated or bool(self.derivative) or self.type == "Clock"
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,9 +242,8 @@ class ComponentDescription:
                 return known.repeat_index == variable.repeat_index
             return bool(inputs) or (variable.repeat, known.repeat) != ("mode", "contact")
 
-        starts = (
-            v for v in self.variables_of(version) if v.causality == "parameter" and v.initial == "exact"
-        )
+        kinds = ("parameter", "structuralParameter")
+        starts = (v for v in self.variables_of(version) if v.causality in kinds and v.initial == "exact")
         knowns = (*inputs, *(v.name for v in starts if may_matter(v)))
         return None if inputs and len(knowns) > MOST_KNOWNS else knowns
 

@@ -183,6 +183,8 @@ def _add_variable(parent: Element, variable: Variable, version: int, references:
         SubElement(scalar, FMI2_TYPES[variable.type], _value_attributes(variable, references))
         return
     values = _value_attributes(variable, references)
+    if variable.type == "Clock":
+        values["intervalVariability"] = "triggered"
     element = SubElement(parent, variable.type, _present(attributes) | values)
     for size in variable.dimensions:
         SubElement(element, "Dimension", start=str(size))
@@ -195,6 +197,7 @@ def _value_attributes(variable: Variable, references: Mapping[str, str]) -> dict
         if value is not None:  # TOML's `1` means `1.0` for a Float64
             attributes[key] = literal(float(value) if variable.type == "Float64" else value)
     attributes["derivative"] = references.get(variable.derivative, "")
+    attributes["clocks"] = references.get(variable.clock, "")
     return _present(attributes)
 
 

@@ -30,13 +30,13 @@ from vibroimpact.fmus.units import BASE_UNITS
 #: Namespace of the tokens. A token is a uuid5 of the bytes of variables.toml: equal files have equal tokens.
 TOKEN_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "vibroimpact")
 
-TYPES = ("Float64", "Int64", "Boolean", "Enumeration")
+TYPES = ("Float64", "Int64", "Boolean", "Enumeration", "Clock")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
-    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports", "derivative", "event_indicator"),
+    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports", "derivative", "event_indicator", "clock"),
 }
-PORTS = ("importer", "external")
+PORTS = ("importer", "external", "strobes", "structural")
 #: Mark in a dependency for every index of a repeated block; `{k}` is the variable's own index.
 ALL = "{*}"
 
@@ -170,7 +170,7 @@ def _variable(
         type=entry["type"],
         causality=entry["causality"],
         variability=entry["variability"],
-        initial=entry.get("initial", default),
+        initial=None if entry["type"] == "Clock" else entry.get("initial", default),
         value_reference=reference,
         field=_indexed(entry["field"], index),
         code=f"{entry['code']}_{index}" if index else entry["code"],
@@ -188,6 +188,7 @@ def _variable(
         ports=entry.get("ports", ""),
         derivative=_indexed(entry.get("derivative", ""), index),
         event_indicator=entry.get("event_indicator", False),
+        clock=entry.get("clock", ""),
         shown_name=entry["name"].replace("{k}", "k"),
         shown_description=entry["description"].replace("{k}", "k"),
     )
@@ -286,6 +287,11 @@ def _rules(table: Mapping[str, Any]) -> tuple[Rule, ...]:
             "derivative",
             "the name of a variable of the file",
             lambda e: e.get("derivative", e["name"]) in names,
+        ),
+        (
+            "clock",
+            "the name of a clock of the file",
+            lambda e: "clock" not in e or e["clock"] in {v["name"] for v in table["variable"] if v["type"] == "Clock"},
         ),
         ("ports", f"one of {', '.join(PORTS)}, or none", lambda e: e.get("ports", PORTS[0]) in PORTS),
         ("repeat", "a count in [component]", lambda e: _repeat_is_counted(table["component"], e)),

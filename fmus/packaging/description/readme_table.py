@@ -29,6 +29,8 @@ def with_table(readme: str, component: ComponentDescription) -> str:
 
 def _row(component: ComponentDescription, variable: Variable) -> str:
     only = " (FMI 3.0 only)" if variable.versions == (3,) and variable.causality != "independent" else ""
+    if not variable.versions:
+        only = f" (FMI 3.0, with `fmu export --{variable.ports}`)"
     kind = f"{variable.causality}, {variable.variability}"
     meaning = variable.shown_description.replace("|", "\\|")
     cells = (

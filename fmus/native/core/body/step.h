@@ -14,7 +14,8 @@ typedef enum {
     VI_STEP_CRAWL = 6,        /* stopped early: long work has advanced time by no more than its rounding */
     VI_STEP_NOT_FINITE = 7,   /* stopped early: the motion goes beyond the largest numbers */
     VI_STEP_UNFINISHED = 8,   /* stopped early after the most work of a step; the next step continues */
-    VI_STEP_UNBOUNDED = 9     /* stopped early: a motion that grows has met its limit, or can meet no stop any more */
+    VI_STEP_UNBOUNDED = 9,    /* stopped early: a motion that grows has met its limit, or can meet no stop any more */
+    VI_STEP_STROBE = 10       /* stopped early: a clock ticks here */
 } vi_step_result;
 
 /* Can the component make no further step? Its message gives the reason. */

@@ -349,7 +349,7 @@ def test_what_counts_a_block_starts_with_the_number_asked_for(joined: ComponentD
         (
             'type = "Boolean"',
             'type = "Bool"',
-            "expected one of Float64, Int64, Boolean, Enumeration, got 'Bool'",
+            "expected one of Float64, Int64, Boolean, Enumeration, Clock, got 'Bool'",
         ),
         ('unit = "m"', 'unit = "metre"', "unit: expected a unit of the file, got 'metre'"),
         ('enumeration = "Law"', 'enumeration = "Lore"', "enumeration: expected"),

@@ -22,10 +22,10 @@ STOP = {
 OUTPUTS = ("displacement", "velocity", "contact[1].count", "contact[1].impulse")
 
 
-def samples(fmu: Path, parameters: dict[str, object]) -> list[bytes]:
+def samples(fmu: Path, parameters: dict[str, object], run_as: str = "auto") -> list[bytes]:
     """Return the bits of the samples of a run."""
     document = {
-        "component": {"b": {"fmu": fmu.name, "parameters": parameters}},
+        "component": {"b": {"fmu": fmu.name, "parameters": parameters, "run_as": run_as}},
         "record": {"recorded_time": 0.05, "rate": 2000, "variables": [f"b.{name}" for name in OUTPUTS]},
         "execution": {"guard": False},
     }
@@ -42,3 +42,15 @@ def test_an_export_of_16_modes_set_to_4_is_an_export_of_4_modes_to_the_bit(tmp_p
     small = export_fmu("Beam", tmp_path / "small.fmu", fmi=fmi, modes=4, contacts=1)
     assert samples(large, {**STOP, "modes": 4}) == samples(small, {**STOP})
     assert samples(large, {**STOP, "modes": 5}) != samples(small, {**STOP})
+
+
+@pytest.mark.parametrize("run_as", ["co_simulation", "model_exchange"])
+def test_a_scene_sets_structural_parameters_in_configuration_mode(tmp_path: Path, run_as: str) -> None:
+    second = {"contact[2].law": 1, "contact[2].location": 0.5, "contact[2].position": 1e-5}
+    large = export_fmu(
+        "Beam", tmp_path / "large.fmu", modes=4, contacts=2, starts={**STOP, **second}, structural=True
+    )
+    small = export_fmu("Beam", tmp_path / "small.fmu", modes=4, contacts=1, starts=STOP)
+    found = samples(large, {"contacts": 1}, run_as=run_as)
+    assert found == samples(small, {}, run_as=run_as)
+    assert found != samples(large, {}, run_as=run_as)
