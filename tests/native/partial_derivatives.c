@@ -217,14 +217,18 @@ static void random_calls_are_errors_or_right(uint64_t *seed)
     CHECK(instance != NULL, "%s", "memory");
     instance->log = count_lines;
     for (int n = 0; n < 50000; ++n) {
-        const size_t unknowns = choice(seed, 4), knowns = choice(seed, 4), most = 6;
-        uint32_t from[6], to[6];
+        const size_t unknowns = choice(seed, 6), knowns = choice(seed, 6), most = 6;
+        static uint32_t from[6], to[6];
         double seeds[6], found[6];
         make_random(seed, instance->self);
+        const bool again = choice(seed, 3) == 0; /* the references of the last call */
         for (size_t i = 0; i < most; ++i) {
+            seeds[i] = uniform(seed, -1.0, 1.0);
+            if (again) {
+                continue;
+            }
             from[i] = choice(seed, 30) == 0 ? (uint32_t)next_random(seed) : choice(seed, VARIABLES);
             to[i] = choice(seed, 30) == 0 ? (uint32_t)next_random(seed) : choice(seed, VARIABLES);
-            seeds[i] = uniform(seed, -1.0, 1.0);
         }
         const bool back = choice(seed, 2) == 0;
         const size_t wrong = choice(seed, 10) == 0 ? 1 : 0;

@@ -64,6 +64,8 @@ void vi_instance_free(vi_instance *instance)
         free(instance->references);
         free(instance->pairs);
         free(instance->slots);
+        free(instance->knowns.references);
+        free(instance->unknowns.references);
         free(instance);
     }
 }

@@ -28,6 +28,13 @@ enum {
 
 typedef struct vi_instance vi_instance;
 
+/* References of the last derivative in the order of the arrays of their variables: the places in this order, and from each
+ * on the number of variables that follow each other in one array. All are in the memory of `references`. */
+typedef struct {
+    uint32_t *references, *place, *run, *head;
+    size_t count, room;
+} vi_order;
+
 struct vi_instance {
     void *self;            /* the component's struct, with its record */
     vi_mode_of_use mode;
@@ -51,6 +58,7 @@ struct vi_instance {
     vi_derivative_pair *pairs; /* whose derivatives are further variables; NULL: none are */
     vi_variable *slots;      /* these variables */
     size_t pair_count;
+    vi_order knowns, unknowns;
     void *resources;         /* resources opened by the component; NULL for most components */
 };
 

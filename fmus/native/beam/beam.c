@@ -369,7 +369,6 @@ static void show_states(void *self, vi_exchange_body *body)
 static bool column(void *self, size_t offset, vi_line *line)
 {
     const beam *b = self;
-    const double cosine = vi_body_cosine_of_forcing(&b->body);
     switch (offset) {
     case offsetof(beam, force):
         vi_body_line_of_shape(&b->body, line, b->forced_shape);
@@ -385,8 +384,8 @@ static bool column(void *self, size_t offset, vi_line *line)
             line->own[j] = force_on_mode(b, j, 1.0);
         }
         vi_body_line_of_shape(&b->body, line, line->own);
-        line->load = cosine;
-        line->base = b->forcing_kind == FORCED_BY_BASE ? cosine : 0.0;
+        line->load = vi_body_cosine_of_forcing(&b->body);
+        line->base = b->forcing_kind == FORCED_BY_BASE ? line->load : 0.0;
         return true;
     default: return false;
     }
@@ -419,7 +418,7 @@ static bool row(void *self, size_t offset, vi_line *line)
     } else {
         return false;
     }
-    return vi_body_line_of_mode(&b->body, line, j, 1.0 / b->root_mass);
+    return vi_body_line_of_modes(&b->body, line, j, 1.0 / b->root_mass);
 }
 
 /* ---- derivatives since the start ---- */

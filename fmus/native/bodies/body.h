@@ -125,8 +125,16 @@ double vi_body_cosine_of_forcing(const vi_body *c);
 void vi_body_line_of_shape(const vi_body *c, vi_line *line, const double shape[]);
 bool vi_body_line_of_mode(const vi_body *c, vi_line *line, int j, double shape);
 
+/* The variable is element `first` of an array of VI_MODES alike ones, `used` of which depend on anything: of all modes. */
+void vi_body_line_is_alike(vi_line *line, int first, int used);
+bool vi_body_line_of_modes(const vi_body *c, vi_line *line, int j, double shape);
+
 /* Is there an element of the array of doubles at `place` at this offset? Then *index is its index. */
-bool vi_body_is_element(size_t offset, size_t place, size_t size, int *index);
+static inline bool vi_body_is_element(size_t offset, size_t place, size_t size, int *index)
+{
+    *index = (int)((offset - place) / sizeof(double)); /* a large offset for places before the array */
+    return offset - place < size;
+}
 
 /* Give the engine the inputs that were set, and a tuned forcing if the body can go on with it. */
 void vi_body_refresh_inputs(void *self);

@@ -41,10 +41,17 @@ bool vi_body_line_of_mode(const vi_body *c, vi_line *line, int j, double shape)
     return true;
 }
 
-bool vi_body_is_element(size_t offset, size_t place, size_t size, int *index)
+/* Elements of an array from element `first` on, `used` of which depend on anything. */
+void vi_body_line_is_alike(vi_line *line, int first, int used)
 {
-    *index = (int)((offset - place) / sizeof(double)); /* a large offset for places before the array */
-    return offset - place < size;
+    line->alike = VI_ONLY_MODES == 1 ? 0 : VI_MODES - first; /* a single mode is no array */
+    line->used = used - first;
+}
+
+bool vi_body_line_of_modes(const vi_body *c, vi_line *line, int j, double shape)
+{
+    vi_body_line_is_alike(line, j, vi_structure_free_modes(&c->model));
+    return vi_body_line_of_mode(c, line, j, shape);
 }
 
 /* ---- knowns ---- */
@@ -78,10 +85,12 @@ static bool column_of_state(void *self, vi_body *c, uint32_t reference, vi_line 
     vi_this_body.show_states(self, &body);
     *factor = 1.0;
     if (body.shape == NULL) {
-        return vi_body_line_of_mode(c, line, j, body.scale);
+        return vi_body_line_of_modes(c, line, j, body.scale);
     }
     vi_body_line_of_shape(c, line, body.shape[j]);
-    *factor = body.mass[j];
+    line->weight = &body.mass[j];
+    vi_body_line_is_alike(line, j, line->count);
+    line->rows = 1;
     line->count = j < line->count ? line->count : 0; /* masses beyond those in use stand still */
     return true;
 }
@@ -160,10 +169,13 @@ static bool is_observed_on_stop(vi_body *c)
 
 static bool row_of_force(const vi_structure *s, int k, vi_line *line)
 {
-    double acceleration[VI_MODES], force[VI_PORTS];
-    vi_structure_accelerate(s, acceleration, force);
+    double acceleration[VI_MODES];
+    if (!line->forces_known) {
+        vi_structure_accelerate(s, acceleration, line->present);
+        line->forces_known = 1;
+    }
     line->port = k;
-    line->force = force[k] >= 0.0 ? 1.0 : 0.0;
+    line->force = line->present[k] >= 0.0 ? 1.0 : 0.0;
     return true;
 }
 
@@ -242,7 +254,7 @@ static bool row_of_body(vi_body *c, size_t member, vi_line *line)
     }
     if (vi_body_is_element(member, offsetof(vi_body, modal_acceleration), sizeof c->modal_acceleration, &j)) {
         line->load = 1.0;
-        return vi_body_line_of_mode(c, line, j, 1.0);
+        return vi_body_line_of_modes(c, line, j, 1.0);
     }
     return row_of_energies(c, member, line) || is_constant(member);
 }

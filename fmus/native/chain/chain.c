@@ -237,16 +237,24 @@ static void line_of_mass(const chain *c, int i, vi_line *line)
 {
     vi_body_line_of_shape(&c->body, line, c->shape[i]);
     line->count = i < c->masses ? line->count : 0;
+    vi_body_line_is_alike(line, i, (int)c->masses);
+    line->rows = 1;
 }
 
-/* The line of an acceleration of the base: its forces on the modes. */
+/* The line of an acceleration of the base: its forces on the modes, summed over two masses at a time. */
 static void line_of_base(const chain *c, double factor, vi_line *line)
 {
-    double load[VI_MODES];
-    for (int i = 0; i < c->masses; ++i) {
-        load[i] = -c->parameter.mass[i];
+    const int masses = (int)c->masses, modes = line->own_known ? 0 : modes_of(c);
+    for (int j = 0; j < modes; ++j) {
+        line->own[j] = masses % 2 == 1 ? -c->parameter.mass[masses - 1] * c->shape[masses - 1][j] : 0.0;
     }
-    project(c, load, line->own);
+    for (int i = 0; i + 1 < masses && modes > 0; i += 2) {
+        const double mass = c->parameter.mass[i], next = c->parameter.mass[i + 1];
+        for (int j = 0; j < modes; ++j) {
+            line->own[j] -= mass * c->shape[i][j] + next * c->shape[i + 1][j];
+        }
+    }
+    line->own_known = 1; /* no other known of a Chain has a shape of its own */
     vi_body_line_of_shape(&c->body, line, line->own);
     line->load = factor;
     line->base = factor;
@@ -255,20 +263,21 @@ static void line_of_base(const chain *c, double factor, vi_line *line)
 static bool column(void *self, size_t offset, vi_line *line)
 {
     const chain *c = self;
-    const double cosine = vi_body_cosine_of_forcing(&c->body);
     int i;
     if (vi_body_is_element(offset, offsetof(chain, force), sizeof c->force, &i)) {
         line_of_mass(c, i, line);
         line->load = 1.0;
     } else if (vi_body_is_element(offset, offsetof(chain, forcing_amplitude), sizeof c->forcing_amplitude, &i)) {
         line_of_mass(c, i, line);
-        line->load = cosine;
+        line->load = vi_body_cosine_of_forcing(&c->body);
     } else if (offset == offsetof(chain, body.base_acceleration)) {
         line_of_base(c, 1.0, line);
     } else if (offset == offsetof(chain, forcing_base_acceleration)) {
-        line_of_base(c, cosine, line);
+        line_of_base(c, vi_body_cosine_of_forcing(&c->body), line);
+    } else if (vi_body_is_element(offset, offsetof(chain, force_rate), sizeof c->force_rate, &i)) {
+        vi_body_line_is_alike(line, i, 0);
     } else {
-        return vi_body_is_element(offset, offsetof(chain, force_rate), sizeof c->force_rate, &i);
+        return false;
     }
     return true;
 }

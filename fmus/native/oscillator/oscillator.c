@@ -145,16 +145,16 @@ static void show_states(void *self, vi_exchange_body *body)
 static bool column(void *self, size_t offset, vi_line *line)
 {
     const oscillator *o = self;
-    const double root = sqrt(o->mass), cosine = vi_body_cosine_of_forcing(&o->body);
+    const double root = sqrt(o->mass);
     vi_body_line_of_mode(&o->body, line, 0, 1.0);
     switch (offset) {
     case offsetof(oscillator, force): line->load = 1.0 / root; return true;
     case offsetof(oscillator, force_rate): return true;
     case offsetof(oscillator, body.base_acceleration): line->load = -root; return true;
-    case offsetof(oscillator, forcing_amplitude): line->load = cosine / root; return true;
+    case offsetof(oscillator, forcing_amplitude): line->load = vi_body_cosine_of_forcing(&o->body) / root; return true;
     case offsetof(oscillator, forcing_base_acceleration):
-        line->load = -root * cosine;
-        line->base = cosine;
+        line->base = vi_body_cosine_of_forcing(&o->body);
+        line->load = -root * line->base;
         return true;
     default: return false;
     }

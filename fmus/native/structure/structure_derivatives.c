@@ -43,14 +43,15 @@ static bool column_of_signal(modal_structure *s, int k, vi_line *line)
 bool vi_structure_column(void *self, size_t offset, vi_line *line)
 {
     modal_structure *s = self;
-    const double cosine = vi_body_cosine_of_forcing(&s->body);
     int k;
     switch (offset) {
     case offsetof(modal_structure, force): return line_of_load(s, s->force_shape, 1.0, false, line);
     case offsetof(modal_structure, force_rate): return true;
     case offsetof(modal_structure, body.base_acceleration): return line_of_load(s, s->base, 1.0, true, line);
-    case offsetof(modal_structure, forcing_amplitude): return line_of_load(s, s->forcing, cosine, false, line);
-    case offsetof(modal_structure, forcing_base_acceleration): return line_of_load(s, s->base, cosine, true, line);
+    case offsetof(modal_structure, forcing_amplitude):
+        return line_of_load(s, s->forcing, vi_body_cosine_of_forcing(&s->body), false, line);
+    case offsetof(modal_structure, forcing_base_acceleration):
+        return line_of_load(s, s->base, vi_body_cosine_of_forcing(&s->body), true, line);
     default: break;
     }
     if (offset - offsetof(modal_structure, sine) < sizeof s->sine) {
@@ -72,7 +73,7 @@ bool vi_structure_row(void *self, size_t offset, vi_line *line)
     } else {
         return false;
     }
-    return vi_body_line_of_mode(&s->body, line, j, 1.0);
+    return vi_body_line_of_modes(&s->body, line, j, 1.0);
 }
 
 VI_RARE bool vi_structure_parameter(void *self, size_t offset, vi_parameter *parameter, vi_sensitivity *of)

@@ -39,9 +39,10 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     folder = tmp_path_factory.mktemp("bodies")
 
     @cache
-    def write(component: str, version: str, external: bool = False) -> Path:
-        path = folder / f"{component}-{version}-{external}.fmu"
-        return export_fmu(component, path, fmi=version, external=external, **BODIES[component])
+    def write(component: str, version: str, external: bool = False, full: bool = False) -> Path:
+        path = folder / f"{component}-{version}-{external}-{full}.fmu"
+        options = {} if full else BODIES[component]
+        return export_fmu(component, path, fmi=version, external=external, full=full, **options)
 
     return write
 
@@ -270,6 +271,39 @@ def test_adjoint_derivatives_are_the_transposed_directional_ones(
         np.abs(directional(it, unknowns, knowns, seed) - np.dot(forward, seed)).max()
         <= 1e-12 * np.abs(forward).max()
     )
+
+
+@pytest.mark.parametrize("masses", [2, MASSES])
+@pytest.mark.parametrize("component", BODIES)
+def test_lists_in_any_order_give_the_sums_of_single_calls(
+    exported: Callable[..., Path], component: str, masses: int
+) -> None:
+    it = Integrated(component.capitalize(), "3.0", exported(component, "3.0"))
+    if component == "chain":
+        it.set({"masses": masses})
+    started(it, "presses")
+    unknowns, knowns = names_of(it)
+    forward, generator = jacobian(it, unknowns, knowns), np.random.default_rng(2)
+    for _ in range(10):
+        rows, columns = (generator.integers(0, len(names), size=40) for names in (unknowns, knowns))
+        chosen = [unknowns[i] for i in rows], [knowns[j] for j in columns]
+        seed = generator.normal(size=40)
+        matrix = forward[rows][:, columns]
+        near = 1e-12 * np.abs(matrix).sum()
+        for _ in range(2):  # the second call knows the lists
+            assert np.abs(directional(it, *chosen, seed) - matrix @ seed).max() <= near
+            assert np.abs(adjoint(it, *chosen, seed) - seed @ matrix).max() <= near
+
+
+def test_a_chain_of_fewer_modes_than_masses_has_them(exported: Callable[..., Path]) -> None:
+    it = Integrated("Chain", "3.0", exported("chain", "3.0", full=True), "CoSimulation")
+    it.set({"masses": 4, "modes": 1, "forcing.angular_frequency": 2.0, "displacement_start[1]": 0.1})
+    it.fmu.exitInitializationMode()
+    unknowns = [f"{name}[{k}]" for name in ("relative_acceleration", "acceleration") for k in range(1, 5)]
+    knowns = [f"force[{k}]" for k in range(1, 5)] + ["base_acceleration"]
+    found = directional(it, unknowns, knowns, np.ones(5))
+    assert found == pytest.approx(jacobian(it, unknowns, knowns).sum(axis=1))
+    assert found == pytest.approx(by_differences(it, unknowns, knowns, 1.0).sum(axis=1))
 
 
 # ---- co-simulation, and the stop ----

@@ -16,12 +16,16 @@ typedef struct {
 static vi_contact_force slopes_of(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_stop_press(s, k);
-    const vi_law *law = vi_law_of(s->contacts[k].law.law);
-    if (press.kind == VI_PRESS_POWER && vi_structure_clearance(s, k) == 0.0) {
-        return vi_law_force(law, &press, DBL_MIN, vi_structure_approach(s, k));
+    const bool is_power = press.kind == VI_PRESS_POWER;
+    if (!is_power && s->state->exchange.on) {
+        return (vi_contact_force){0.0, press.stiffness, press.damping};
+    }
+    const double depth = -vi_structure_clearance(s, k);
+    if (is_power && depth == 0.0) {
+        return vi_law_force(vi_law_of(s->contacts[k].law.law), &press, DBL_MIN, vi_structure_approach(s, k));
     }
     const vi_contact_force force = vi_structure_yield(s, k);
-    const bool ended = !s->state->exchange.on && force.force <= 0.0 && vi_structure_clearance(s, k) != 0.0;
+    const bool ended = !s->state->exchange.on && force.force <= 0.0 && depth != 0.0;
     return ended ? (vi_contact_force){0.0, 0.0, 0.0} : force;
 }
 
@@ -32,11 +36,9 @@ static void find_slopes(const vi_structure *s, contact_slopes *slopes)
         slopes->held[k] = s->state->status[k] == VI_CONTACT_HELD;
         slopes->pressed[k] = s->state->status[k] == VI_CONTACT_YIELDING;
         slopes->any_held |= slopes->held[k];
-        if (slopes->pressed[k]) {
-            const vi_contact_force force = slopes_of(s, k);
-            slopes->stiffness[k] = force.stiffness;
-            slopes->damping[k] = force.damping;
-        }
+        const vi_contact_force force = slopes->pressed[k] ? slopes_of(s, k) : (vi_contact_force){0.0, 0.0, 0.0};
+        slopes->stiffness[k] = force.stiffness;
+        slopes->damping[k] = force.damping;
     }
     if (slopes->any_held) {
         vi_structure_signed(s, s->model->compliance, slopes->g);

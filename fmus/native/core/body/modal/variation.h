@@ -20,18 +20,31 @@ typedef struct {
 typedef struct {
     const double *shape; /* numbers of the modes `first` to `first` + `count` - 1 */
     int first, count;
+    /* Variables of its array from this one on that are alike (0: it is alone): variable m has its one number at mode
+     * `first` + m, or (`rows`) row m of a matrix with rows of VI_MODES, times weight[m]. From `used` on all is 0. */
+    int alike, used, rows;
+    const double *weight; /* NULL: 1 for all, as it is without `rows` */
     double displacement, velocity, load; /* factors of the shape */
     double base;
     int port; /* the contact of `force`, from 0 */
     double force;
     double own[VI_MODES]; /* room for a shape that is nowhere else */
+    double present[VI_PORTS]; /* forces of the contacts now */
+    /* Have `own` and `present` been set by a line of this call? They stay from line to line, and serve later ones. */
+    int own_known, forces_known;
 } vi_line;
+
+/* Number of modes in the shape; at most one where the compiler knows that there is one. */
+static inline int vi_line_count(const vi_line *line)
+{
+    return VI_ONLY_MODES == 1 ? line->count > 0 : line->count;
+}
 
 /* Sum of a shape times a part of the change; a factor of 0 leaves out what may be infinite. */
 static inline double vi_line_product(const vi_line *line, double factor, const double part[])
 {
     double sum = 0.0;
-    for (int i = 0; i < line->count && factor != 0.0; ++i) {
+    for (int i = 0; i < vi_line_count(line) && factor != 0.0; ++i) {
         sum += line->shape[i] * part[line->first + i];
     }
     return factor * sum;
