@@ -75,12 +75,12 @@ class UnpackedFmu:
     ----------
     source : Path
         The FMU file.
-    Its unpacked contents; all processes of the machine share the folder, and none may write to it.
-        Its unpacked contents; shared by all processes of the machine, never to be written to.
+    folder : Path
+        Its unpacked contents; all processes of the machine share the folder, and none may write to it.
     sha256 : str
         Hash of the FMU file.
-    Version `2.0` or `3.0`; instantiationToken of FMI 3.0, or guid of FMI 2.0.
-        `2.0` or `3.0`; FMI 3.0 instantiationToken or FMI 2.0 guid.
+    fmi_version, token : str
+        `2.0` or `3.0`; instantiationToken of FMI 3.0, or guid of FMI 2.0.
     identifiers : tuple of str
         Model identifiers, one for each interface, co-simulation first.
     """

@@ -63,7 +63,8 @@ def problems_of(facts: dict[str, Any]) -> list[Found]:
     try:
         library = CDLL(facts["binary"])
     except OSError as error:
-        return [(REFUSED, f"{name}: expected a library that loads, got: {error}.")]
+        said = str(error).replace(facts["binary"], name)
+        return [(REFUSED, f"{name}: expected a library that loads, got: {said}.")]
     return [
         found
         for interface in facts["interfaces"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -42,6 +43,7 @@ def _load(path: Path, source: str) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
+        said = str(error).replace(f"{path.parents[2]}{os.sep}", "")  # paths in the FMU, not in the cache
         raise ComponentFileError(
-            f"{source}: expected a binary that this system can load, got: {error}"
+            f"{source}: expected a binary that this system can load, got: {said}"
         ) from error

@@ -391,7 +391,8 @@ int vi_door_exchange_step(vi_exchange *e, double time, double size, bool no_stat
     *event = *ends = *early = false;
     *last_time = time;
     e->meets = 0;
-    e->sample_count = 0;
+    /* the instants of a step that ended early: its rest keeps none */
+    e->sample_count = e->instant_count > 0 && e->instants[0] < time - room ? e->instant_count : 0;
     if (!(fabs(time - e->time) <= SAME_TIME * (1.0 + fabs(time)))) {
         return vi_exchange_refused(e, VI_EXCHANGE_SET_TIME, VI_EXCHANGE_TIME);
     }

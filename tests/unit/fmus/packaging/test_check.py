@@ -104,6 +104,7 @@ def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
 
     (problem,) = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
     assert "expected a library that loads" in problem.text
+    assert "/binaries/" not in problem.text
     assert problem.grade is Grade.refused
 
 

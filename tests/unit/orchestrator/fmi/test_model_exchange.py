@@ -346,6 +346,42 @@ def test_a_run_tells_the_kind_and_the_tolerance(folder: Path) -> None:
         assert samples[-1, 1] == pytest.approx(math.cos(1.0), abs=100.0 * float(tolerance))
 
 
+BESIDE_A_BALL = """
+[component.m]
+fmu = "Exchanged.fmi2.fmu"
+parameters = { kind = 3.0, x = 0.1, v = 1.0 }
+COMPONENT
+[record]
+recorded_time = 0.6
+transient_time = 0.033
+rate = 11.11111111111111
+variables = ["m.x"]
+[execution]
+macro_step = 0.3
+exchange = "jacobi"
+guard = false
+"""
+BALL = """[component.ball]
+fmu = "SteppedBall.fmi3.fmu"
+"""
+
+
+def test_the_rest_of_a_step_that_another_component_ended_keeps_no_samples_of_its_first_part(
+    folder: Path,
+) -> None:
+    fmu_factory.stepped_ball(folder)
+    records = []
+    for ball in ("", BALL):
+        scene = parse_scene(BESIDE_A_BALL.replace("COMPONENT", ball), str(folder / "scene.toml"))
+        runner = GeneralRunner(scene)
+        try:
+            records.append(runner.run({}).samples)
+        finally:
+            runner.close()
+    assert records[0] is not None
+    assert records[1] == pytest.approx(records[0], abs=1e-6)
+
+
 def test_a_scene_names_a_kind_that_its_fmu_lacks(folder: Path) -> None:
     text = SCENE.format(fmu="Exchanged.fmi3.fmu", run_as="co_simulation", more="")
     expected = (
