@@ -136,7 +136,7 @@ class ChosenStep(Structure):
             (name, c_double)
             for name in ("window", "tolerance", "share", "rounding_part", "steady", "smallest")
         ),
-        ("first_size", c_double),
+        *((name, c_double) for name in ("shortest", "first_size")),
         ("worst", c_int64),
         ("error", c_double),
     ]

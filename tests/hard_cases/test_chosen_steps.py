@@ -240,3 +240,57 @@ def test_a_discard_without_states_is_refused_by_the_flag(folder: Path, fmi: str)
     ):
         importer.advance(1.0)
     importer.free()
+
+
+# ---- impacts and chaos ----
+
+
+def test_an_impact_just_after_the_start_of_a_step_ends_it(folder: Path) -> None:
+    # a step ends 1e-13 s before the impact: halves of the next one meet it in the first half
+    parts = [
+        stop("s", 0.7),
+        oscillator("b", stiffness=20.429066562504765, displacement_start=-0.3129482693927197),
+        oscillator("a", velocity_start=0.8645727438786404, **external(0.3)),
+    ]
+    links = [
+        *contact("a", "s"),
+        link("b.displacement", "a.force", 0.21218296064725167),
+        link("a.displacement", "b.force", -0.15734607939644005),
+    ]
+    for in_c in (True, False):
+        importer = chosen(parts, links, tolerance=0.002797543140367294)
+        importer.steps_in_c = in_c
+        events = events_of(importer)
+        importer.begin()
+        importer.advance(1.0)
+        assert [event.time for event in events] == pytest.approx([0.358209570124])
+        importer.free()
+
+
+def test_chaos_multiplies_errors_that_the_estimate_has_counted_once() -> None:
+    # the estimate bounds the error of the first impacts; later two tolerances give two motions, which it does not tell
+    hit = {"stiffness": 1.094, "damping": 0.099, "forcing.amplitude": 1.695, "forcing.angular_frequency": 2.605}
+    parts = [
+        oscillator("a", **hit, **external(0.252)),
+        stop("s", 0.818),
+        oscillator("b", stiffness=2.764, damping=0.1),
+    ]
+    links = [
+        *contact("a", "s"),
+        link("a.displacement", "b.force", 0.241),
+        link("b.displacement", "a.force", 0.241),
+    ]
+    times, found, sums = (5.0, 20.0, 40.0), [], []
+    for tolerance in (1e-3, 1e-4):
+        importer = chosen(parts, links, tolerance=tolerance)
+        importer.begin()
+        assert importer.adaptive is not None
+        for time in times:
+            importer.advance(time)
+            found.append(values(importer, "a", "displacement")[0])
+            sums.append(importer.adaptive.record.error)
+        importer.free()
+    off = [abs(one - other) for one, other in zip(found[:3], found[3:], strict=True)]
+    assert off[0] < sums[0] + sums[3]
+    assert max(off[1:]) > 50.0 * off[0]
+    assert sums[2] < 3.0 * sums[0]

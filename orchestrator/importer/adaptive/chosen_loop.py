@@ -116,6 +116,10 @@ class ChosenLoop:
             self.plain.explain_step()
         return came_to is CouplingEnd.reached
 
+    def bound(self, shortest: float) -> None:
+        """Set the shortest size of the next step, s: an event within it counts as one at its end."""
+        self._chosen.shortest = shortest
+
     @property
     def error(self) -> tuple[float, str]:
         """The largest error of the last step over the tolerance, and the name of its variable."""

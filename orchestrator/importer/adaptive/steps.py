@@ -199,6 +199,8 @@ class AdaptiveSteps:
     def _attempt(self, time: float, wish: float) -> tuple[float, tuple[float, str]]:
         """Make a step towards `wish`, s; return its planned end, and its error with the name of an output."""
         importer, loop = self._importer, self._loop
+        if loop is not None:
+            loop.bound(self._shortest(time) * SAME_SHORTEST)
         if loop is not None and importer.attempt_in_c(loop.plain, loop.try_step, time, wish):
             return wish, loop.error
         planned = importer.attempt(time, wish)
@@ -209,7 +211,7 @@ class AdaptiveSteps:
         """Go back before a discarded step and choose a shorter one; ComponentError at the shortest."""
         self.record.rejected += 1
         size, shortest = discard.end - time, self._shortest(time)
-        if size <= shortest * SAME_SHORTEST:
+        if self._is_shortest(time, size):
             raise ComponentError(
                 f"{discard.at}: expected a step of {shortest:.3g} s, the shortest of the run, got a discard at time "
                 f"{discard.start:.12g}: {discard.reason}",
@@ -287,6 +289,9 @@ class AdaptiveSteps:
     def _shortest(self, time: float) -> float:
         return max(SHORTEST * self._span, TIME_ROUNDINGS * SAME_INSTANT * (1.0 + abs(time)))
 
+    def _is_shortest(self, time: float, size: float) -> bool:
+        return size <= self._shortest(time) * SAME_SHORTEST
+
     def _is_first(self, size: float) -> bool:
         return size <= self._controller.first * (1.0 + SAME_SIZE)
 
@@ -295,7 +300,7 @@ class AdaptiveSteps:
         shortest = self._shortest(time)
         if self._controller.size >= shortest:
             return
-        if error[0] > 1.0 and size <= shortest * SAME_SHORTEST:
+        if error[0] > 1.0 and self._is_shortest(time, size):
             raise ComponentError(
                 f"macro_step: expected an error of at most {self._tolerance:g} of each value in steps of "
                 f"{shortest:.3g} s, got {error[0] * self._tolerance:.3g} of {error[1]} at time {time:.12g}. "
@@ -325,7 +330,8 @@ class AdaptiveSteps:
             with self._other_slots():
                 middle = time + 0.5 * size
                 if double.try_step(time, middle) < middle or double.is_at_event:
-                    return math.inf, self._halved.names[0] if self._halved.names else ""
+                    # up to the shortest size it is the event at which the whole step has ended
+                    return (0.0 if self._is_shortest(time, size) else math.inf), self._halved.names[0]
                 with self._prior_states():
                     # an FMU that repeats a last step that is not accepted has none after a restored state
                     for component in self._plan.saved:

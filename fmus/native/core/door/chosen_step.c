@@ -118,16 +118,19 @@ static int half_step(const vi_coupling_plan *trial, vi_chosen_step *s, vi_coupli
     return result == GO_ON ? vi_coupling_step(trial, &ignored, r) : result;
 }
 
-/* Make both half steps from the start; the error is infinite if the first one ends at an event. */
-static int both_halves(const vi_coupling_plan *plan, vi_chosen_step *s, vi_coupling_run *r, double end, double size)
+/* Make both half steps from the start. The error is infinite if the first one ends at an event: no step that ends there
+ * may be longer, but the shortest. */
+static int both_halves(const vi_coupling_plan *plan, vi_chosen_step *s, vi_coupling_run *r, double end, double size,
+                       bool *is_cut)
 {
     vi_coupling_plan trial = *plan;
     trial.components = s->trial;
     const double start = r->start, middle = start + 0.5 * size;
     int result = half_step(&trial, s, r, start, middle);
     if (result == GO_ON && (r->reached < middle || r->arrived > 0)) {
-        s->error = INFINITY;
+        s->error = size <= s->shortest ? 0.0 : INFINITY;
         s->worst = 0;
+        *is_cut = true;
         return GO_ON;
     }
     /* an FMU that repeats a last step that is not accepted has none after a restored state */
@@ -175,7 +178,7 @@ static int estimate(const vi_coupling_plan *plan, vi_chosen_step *s, vi_coupling
     const double end = run->reached, size = end - run->start;
     vi_coupling_run r = *run;
     r.at_event = s->at_event;
-    s->error = 0.0;
+    bool is_cut = false;
     keep_answers(plan, s);
     int result = vi_coupling_make(plan, &r, &s->save_end);
     if (result == GO_ON) {
@@ -188,7 +191,7 @@ static int estimate(const vi_coupling_plan *plan, vi_chosen_step *s, vi_coupling
         result = consistent_values(plan, s, &r, s->before);
     }
     if (result == GO_ON) {
-        result = both_halves(plan, s, &r, end, size);
+        result = both_halves(plan, s, &r, end, size, &is_cut);
     }
     if (result == GO_ON) {
         result = vi_coupling_make(plan, &r, &s->restore_end);
@@ -202,7 +205,7 @@ static int estimate(const vi_coupling_plan *plan, vi_chosen_step *s, vi_coupling
         return result;
     }
     give_answers_back(plan, s);
-    return isinf(s->error) || judge(s, end, size) ? GO_ON : VI_COUPLING_LISTEN;
+    return is_cut || judge(s, end, size) ? GO_ON : VI_COUPLING_LISTEN;
 }
 
 VI_DOOR int vi_door_chosen_step(const vi_coupling_plan *plan, vi_chosen_step *chosen, vi_coupling_progress *progress,

@@ -24,6 +24,7 @@ typedef struct {
     double window;                       /* s, in which a motion from 0 has no scale */
     double tolerance, share;             /* of a step; part of the error that the halves leave out */
     double rounding_part, steady, smallest;
+    double shortest; /* s; up to this size an event in the first half counts as that of the step */
     double first_size;                   /* s; values that begin to move do not lengthen or shorten steps up to it */
     int64_t worst;                       /* variable with the largest error */
     double error; /* largest error over the tolerance, infinite where a half step met an event */
