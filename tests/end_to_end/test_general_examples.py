@@ -80,6 +80,13 @@ def test_a_body_and_a_stop_of_two_fmi_versions_keep_the_period_one_orbit(tmp_pat
     comes_back(tmp_path, "mixed_versions")
 
 
+def test_a_body_in_model_exchange_keeps_the_period_one_orbit(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "model_exchange"))
+    assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-8)
+    assert dataset.impact_velocity.values == pytest.approx(0.79105, abs=1e-5)
+    comes_back(tmp_path, "model_exchange")
+
+
 def test_a_phase_of_the_last_impact_has_no_value_before_the_first(tmp_path: Path) -> None:
     text = (EXAMPLES / "mixed_versions.toml").read_text()
     from_rest = text.replace("transient_time = 1256.6370614359173", "transient_time = 0")
