@@ -238,7 +238,7 @@ static void random_calls_are_errors_or_right(uint64_t *seed)
         const int before = lines;
         const vi_status status = vi_instance_derive(instance, "derive", &call);
         CHECK(lines == before + (status == VI_OK ? 0 : 1), "%d lines for one call", lines - before);
-        const int32_t orders[] = {(int32_t)choice(seed, 4), 1, 2, (int32_t)choice(seed, 3)};
+        const int32_t orders[] = {(int32_t)choice(seed, 4), 1, 2, (int32_t)choice(seed, 3), 1, 2};
         const vi_status over_time = vi_instance_differentiate(instance, "differentiate", choice(seed, 20) == 0 ? NULL : to,
                                                               orders, found, unknowns);
         CHECK(lines == before + (status == VI_OK ? 0 : 1) + (over_time == VI_OK ? 0 : 1), "%d lines for two calls",
