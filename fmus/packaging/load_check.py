@@ -111,7 +111,7 @@ def required_functions(fmi_version: str, interface: str) -> list[str]:
 
 def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     major = facts["fmi_version"][0]
-    instance = (_instantiate3 if major == "3" else _instantiate2)(library, facts, token.encode())
+    instance = (instance3 if major == "3" else instance2)(library, facts, token.encode())
     if not instance:
         return False
     if not hasattr(library, f"fmi{major}FreeInstance"):
@@ -122,7 +122,8 @@ def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     return True
 
 
-def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+def instance3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+    """Return the address of an instance of FMI 3.0; None or 0 without one."""
     function = library[instantiating_function(facts)]
     function.restype = c_void_p
     log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)(lambda *_: None)
@@ -137,7 +138,8 @@ def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     return function(*head, c_void_p(), log, *rest)
 
 
-def _instantiate2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+def instance2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+    """Return the address of an instance of FMI 2.0; None or 0 without one."""
     function = library["fmi2Instantiate"]
     function.restype = c_void_p
     kind = c_int(0 if facts["interface"] == "ModelExchange" else 1)
