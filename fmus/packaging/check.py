@@ -123,6 +123,7 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
             for interface in root.findall(tag)
             if interface.get("modelIdentifier") == fmu.identifiers[0]
         ],
+        "event_mode": any(one.get("hasEventMode") in ("true", "1") for one in root.findall("CoSimulation")),
         "restorable": any(
             interface.get(f"canGetAndSetFMU{word}") in ("true", "1")
             for tag in INTERFACES

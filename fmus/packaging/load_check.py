@@ -57,7 +57,8 @@ def problems_of(facts: dict[str, Any]) -> list[Found]:
     """Return the problems of a binary, each with the name of its grade and a line.
 
     The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder),
-    `restorable` (canGetAndSetFMUState), and `any_token` (whether the binary is known to accept every token).
+    `restorable` (canGetAndSetFMUState), `event_mode` (hasEventMode), and `any_token` (whether the binary is known to
+    accept every token).
     """
     name = Path(facts["binary"]).name
     try:
@@ -112,6 +113,8 @@ def required_functions(fmi_version: str, interface: str) -> list[str]:
 def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     major = facts["fmi_version"][0]
     instance = (instance3 if major == "3" else instance2)(library, facts, token.encode())
+    if not instance and facts["event_mode"]:  # it may make none without
+        instance = instance3(library, facts, token.encode(), event_mode=True)
     if not instance:
         return False
     if not hasattr(library, f"fmi{major}FreeInstance"):
@@ -122,7 +125,7 @@ def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     return True
 
 
-def instance3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+def instance3(library: CDLL, facts: dict[str, Any], token: bytes, *, event_mode: bool = False) -> Any:
     """Return the address of an instance of FMI 3.0; None or 0 without one."""
     function = library[instantiating_function(facts)]
     function.restype = c_void_p
@@ -131,8 +134,8 @@ def instance3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     resources = c_char_p(facts["resources"].encode() + b"/")
     head = (c_char_p(b"check"), c_char_p(token), resources, c_bool(False), c_bool(False))
     if facts["interface"] == "CoSimulation":
-        # no event mode, no early return, no intermediate variables, no intermediate update
-        events = (c_bool(False), c_bool(False), POINTER(ctypes.c_uint32)(), c_size_t(0))
+        # no early return, no intermediate variables, no intermediate update
+        events = (c_bool(event_mode), c_bool(False), POINTER(ctypes.c_uint32)(), c_size_t(0))
         return function(*head, *events, c_void_p(), log, c_void_p())
     rest = (c_void_p(), c_void_p(), c_void_p()) if facts["interface"] == "ScheduledExecution" else ()
     return function(*head, c_void_p(), log, *rest)

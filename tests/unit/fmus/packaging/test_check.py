@@ -12,6 +12,7 @@ from support.fmpy_checks import validate
 
 from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.packaging import load_check
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.build import is_current
 from vibroimpact.fmus.packaging.check import check_fmu
@@ -107,6 +108,17 @@ def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
     assert "expected a library that loads" in problem.text
     assert "/binaries/" not in problem.text
     assert problem.grade is Grade.refused
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_an_fmu_may_make_instances_in_event_mode_alone(
+    monkeypatch: pytest.MonkeyPatch, declared: bool
+) -> None:
+    def instance(library: object, facts: object, token: bytes, *, event_mode: bool = False) -> int:
+        return int(event_mode)
+
+    monkeypatch.setattr(load_check, "instance3", instance)
+    assert load_check._opens(object(), {"fmi_version": "3.0", "event_mode": declared}, "token") == declared  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
