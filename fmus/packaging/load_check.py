@@ -56,9 +56,9 @@ class Fmi2Callbacks(Structure):
 def problems_of(facts: dict[str, Any]) -> list[Found]:
     """Return the problems of a binary, each with the name of its grade and a line.
 
-    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder),
-    `restorable` (canGetAndSetFMUState), `event_mode` (hasEventMode), and `any_token` (whether the binary is known to
-    accept every token).
+    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...) and `resources` (a folder). Three
+    are truth values: `restorable` (canGetAndSetFMUState), `event_mode` (hasEventMode), and `any_token`: the binary is
+    known to accept every token.
     """
     name = Path(facts["binary"]).name
     try:

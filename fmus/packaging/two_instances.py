@@ -21,17 +21,17 @@ def changed_outputs(facts: dict[str, Any]) -> list[int]:
     of the outputs. Outputs that change by themselves, from one reading to the next, end the trial.
     """
     library = CDLL(facts["binary"])
-    instances = [_begun(library, facts) for _ in range(2)]
-    if not all(instances):
+    moving, idle = (_begun(library, facts) for _ in range(2))
+    if moving is None or idle is None:
         return []
     changes: list[int] = []
     rounds, time = 0, facts["start"]
     for _ in range(ROUNDS):
-        before = [_outputs(library, facts, instances[1]) for _ in range(2)]
-        if before[0] != before[1] or not _steps(library, facts, instances[0], time):
+        before = [_outputs(library, facts, idle) for _ in range(2)]
+        if before[0] != before[1] or not _steps(library, facts, moving, time):
             return []
         time += facts["step"]
-        after = [_outputs(library, facts, instances[1]) for _ in range(2)]
+        after = [_outputs(library, facts, idle) for _ in range(2)]
         if after[0] != after[1]:
             return []
         found = [
