@@ -9,6 +9,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentFileError
@@ -21,6 +22,9 @@ from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time for loading and instantiating an FMU, s.
 LOADING_LIMIT = 60.0
+#: Longest time for a trial of two instances, s; steps of an experiment that proposes none; outputs named.
+TRIAL_LIMIT, STEPS, SHOWN = 10.0, 500, 3
+ONLY_ONCE = "canBeInstantiatedOnlyOncePerProcess"
 #: Names of the interfaces, for people.
 KINDS = {
     "CoSimulation": "co-simulation",
@@ -41,16 +45,16 @@ def check_fmu(path: Path) -> tuple[Finding, ...]:
     except ComponentFileError as error:
         return (Finding(Grade.refused, str(error).removeprefix(f"{path}: ")),)
     # a fault that two interfaces share is reported once
-    return tuple(
-        dict.fromkeys(
-            (
-                *_description_findings(path),
-                *_archive_remarks(path, fmu),
-                *_missing_binaries(fmu),
-                *_loading_findings(fmu),
-            )
+    found = dict.fromkeys(
+        (
+            *_description_findings(path),
+            *_archive_remarks(path, fmu),
+            *_missing_binaries(fmu),
+            *_loading_findings(fmu),
         )
     )
+    runs = all(one.grade is not Grade.refused for one in found)
+    return (*found, *(_shared_memory(fmu) if runs else ()))
 
 
 def kinds_of(path: Path) -> str:
@@ -111,9 +115,7 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
         return (Finding(Grade.refused, str(error).removeprefix(f"{fmu.source}: ")),)
     root = _description(fmu)
     facts = {
-        "binary": str(binary),
-        "fmi_version": fmu.fmi_version,
-        "token": fmu.token,
+        **_facts_of(fmu, binary),
         "interfaces": [
             tag
             for tag in INTERFACES
@@ -121,7 +123,7 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
             for interface in root.findall(tag)
             if interface.get("modelIdentifier") == fmu.identifiers[0]
         ],
-        "resources": str(fmu.resources),
+        "event_mode": any(one.get("hasEventMode") in ("true", "1") for one in root.findall("CoSimulation")),
         "restorable": any(
             interface.get(f"canGetAndSetFMU{word}") in ("true", "1")
             for tag in INTERFACES
@@ -141,3 +143,47 @@ def _loading_findings(fmu: UnpackedFmu) -> tuple[Finding, ...]:
         )
         return (Finding(Grade.refused, f"{binary.name}: {text}"),)
     return tuple(Finding(Grade[grade], text) for grade, text in done.answer)
+
+
+def _facts_of(fmu: UnpackedFmu, binary: Path) -> dict[str, Any]:
+    """Return the facts that an instance needs."""
+    return {
+        "binary": str(binary),
+        "fmi_version": fmu.fmi_version,
+        "token": fmu.token,
+        "resources": str(fmu.resources),
+    }
+
+
+def _shared_memory(fmu: UnpackedFmu) -> Iterator[Finding]:
+    """Yield the doubt that instances of one process share memory, by a trial of two for co-simulation."""
+    description = reading_of(fmu.source).description
+    simulation, experiment = description.coSimulation, description.defaultExperiment
+    outputs = [
+        v
+        for v in description.modelVariables
+        if v.causality == "output" and v.type in ("Real", "Float64") and not v.dimensions and not v.clocks
+    ]
+    if simulation is None or simulation.canBeInstantiatedOnlyOncePerProcess or not outputs:
+        return
+    start, stop, step = (
+        float(getattr(experiment, name, None) or 0.0) for name in ("startTime", "stopTime", "stepSize")
+    )
+    facts = {
+        **_facts_of(fmu, binary_path(fmu)),
+        "interface": "CoSimulation",
+        "start": start,
+        "step": float(simulation.fixedInternalStepSize or 0.0)
+        or step
+        or (stop - start) / STEPS
+        or 1.0 / STEPS,
+        "references": [v.valueReference for v in outputs],
+    }
+    done = call("vibroimpact.fmus.packaging.two_instances:changed_outputs", facts, seconds=TRIAL_LIMIT)
+    if done.code == 0 and done.answer:
+        names = ", ".join(outputs[place].name for place in done.answer[:SHOWN])
+        yield Finding(
+            Grade.doubt,
+            f"expected instances without common memory, or {ONLY_ONCE} = true; a step of one instance changes {names} "
+            "of another in the same process.",
+        )

@@ -56,8 +56,9 @@ class Fmi2Callbacks(Structure):
 def problems_of(facts: dict[str, Any]) -> list[Found]:
     """Return the problems of a binary, each with the name of its grade and a line.
 
-    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder),
-    `restorable` (canGetAndSetFMUState), and `any_token` (whether the binary is known to accept every token).
+    The facts are `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...) and `resources` (a folder). Three
+    are truth values: `restorable` (canGetAndSetFMUState), `event_mode` (hasEventMode), and `any_token`: the binary is
+    known to accept every token.
     """
     name = Path(facts["binary"]).name
     try:
@@ -111,7 +112,9 @@ def required_functions(fmi_version: str, interface: str) -> list[str]:
 
 def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     major = facts["fmi_version"][0]
-    instance = (_instantiate3 if major == "3" else _instantiate2)(library, facts, token.encode())
+    instance = (instance3 if major == "3" else instance2)(library, facts, token.encode())
+    if not instance and facts["event_mode"]:  # it may make none without
+        instance = instance3(library, facts, token.encode(), event_mode=True)
     if not instance:
         return False
     if not hasattr(library, f"fmi{major}FreeInstance"):
@@ -122,7 +125,8 @@ def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
     return True
 
 
-def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+def instance3(library: CDLL, facts: dict[str, Any], token: bytes, *, event_mode: bool = False) -> Any:
+    """Return the address of an instance of FMI 3.0; None or 0 without one."""
     function = library[instantiating_function(facts)]
     function.restype = c_void_p
     log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)(lambda *_: None)
@@ -130,14 +134,15 @@ def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     resources = c_char_p(facts["resources"].encode() + b"/")
     head = (c_char_p(b"check"), c_char_p(token), resources, c_bool(False), c_bool(False))
     if facts["interface"] == "CoSimulation":
-        # no event mode, no early return, no intermediate variables, no intermediate update
-        events = (c_bool(False), c_bool(False), POINTER(ctypes.c_uint32)(), c_size_t(0))
+        # no early return, no intermediate variables, no intermediate update
+        events = (c_bool(event_mode), c_bool(False), POINTER(ctypes.c_uint32)(), c_size_t(0))
         return function(*head, *events, c_void_p(), log, c_void_p())
     rest = (c_void_p(), c_void_p(), c_void_p()) if facts["interface"] == "ScheduledExecution" else ()
     return function(*head, c_void_p(), log, *rest)
 
 
-def _instantiate2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+def instance2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
+    """Return the address of an instance of FMI 2.0; None or 0 without one."""
     function = library["fmi2Instantiate"]
     function.restype = c_void_p
     kind = c_int(0 if facts["interface"] == "ModelExchange" else 1)

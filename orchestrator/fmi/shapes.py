@@ -28,12 +28,16 @@ def dimensions_of(variables: Mapping[str, ModelVariable]) -> dict[str, Dimension
 
 
 def default_sizes(variables: Mapping[str, ModelVariable]) -> dict[str, int]:
-    """Return the start values of the structural parameters, and of other variables that are sizes (constants)."""
+    """Return the start values of structural parameters that are whole numbers, and of sizes that are constants.
+
+    Only UInt64 gives a size: a structural parameter of another type, such as a truth value, is none.
+    """
     sizes = {name for each in dimensions_of(variables).values() for name in each if isinstance(name, str)}
     return {
         name: int(variable.start)
         for name, variable in variables.items()
-        if variable.start is not None and (variable.causality == STRUCTURAL or name in sizes)
+        if variable.start is not None
+        and (name in sizes or (variable.causality == STRUCTURAL and variable.type == "UInt64"))
     }
 
 

@@ -24,12 +24,13 @@ _MAKERS = (
 UNNAMED = "no tool named"
 CAUSES = {
     "FMI 1.0": r"got FMI 1\.0",
+    "a library of another name than the description gives": r"must have one name",
     "no library for this machine": r"a binary for this machine",
     "no components": r"a system with components",
     "a file that the system lacks": r"which it does not have|expected a file of the archive",
-    "a start time other than 0": r"startTime",
     "model exchange alone": r"model exchange|ModelExchange",
     "needs a library or module that is not here": r"cannot open shared object|No module|No such file|JVM",
+    "a description above the limit of 16 MiB": r"expected XML of at most",
     "description beyond repair": r"modelDescription\.xml|its description",
     "names of members with backslashes": r"has a backslash",
     "no FMU inside": r"expected a safe FMU|not a zip|expected an FMU",

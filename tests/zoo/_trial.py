@@ -155,7 +155,7 @@ def _plan(path: Path) -> Facts:
 
 def made(role: str, path: Path) -> Iterator[tuple[str, Facts]]:
     """Yield the results of a trial: `first` the facts of a description, then `result`, perhaps with a refusal."""
-    found = facts(path) if role == "ours" else {}
+    found = facts(path) if role == "ours" and zipfile.is_zipfile(path) else {}
     yield "first", found
     try:
         found |= ROLES[role](path)

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 from fmpy.validation import validate_fmu
+from support import fmu_factory
 from support.fmpy_checks import validate
 
 from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.packaging import load_check
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.build import is_current
 from vibroimpact.fmus.packaging.check import check_fmu
@@ -106,6 +108,28 @@ def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
     assert "expected a library that loads" in problem.text
     assert "/binaries/" not in problem.text
     assert problem.grade is Grade.refused
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_an_fmu_may_make_instances_in_event_mode_alone(
+    monkeypatch: pytest.MonkeyPatch, declared: bool
+) -> None:
+    def instance(library: object, facts: object, token: bytes, *, event_mode: bool = False) -> int:
+        return int(event_mode)
+
+    monkeypatch.setattr(load_check, "instance3", instance)
+    assert load_check._opens(object(), {"fmi_version": "3.0", "event_mode": declared}, "token") == declared  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_instances_that_share_memory_are_found_unless_only_one_may_be(tmp_path: Path, fmi: str) -> None:
+    only_once = fmu_factory.single(tmp_path, fmi)
+    lie = ('canBeInstantiatedOnlyOncePerProcess="true"', "")
+    (found,) = check_fmu(fmu_factory.redescribed(only_once, tmp_path / "lying.fmu", lie))
+    assert "a step of one instance changes y of another" in found.text
+    assert found.grade is Grade.doubt
+    assert not any("common memory" in one.text for one in check_fmu(only_once))
+    assert not any("common memory" in one.text for one in check_fmu(fmu_factory.mass(tmp_path, fmi)))
 
 
 def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:

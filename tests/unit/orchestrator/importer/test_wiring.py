@@ -106,8 +106,12 @@ def test_connections_are_moved_after_those_that_they_depend_on(folder: Path, gai
         component.free()
 
 
-def test_an_output_without_a_list_is_moved_after_all_inputs_of_its_component(folder: Path, gain: Path) -> None:
-    unlisted = fmu_factory.redescribed(gain, folder / "unlisted.fmu", ('index="2" dependencies="1"/>', 'index="2"/>'))
+def test_an_output_without_a_list_is_moved_after_all_inputs_of_its_component(
+    folder: Path, gain: Path
+) -> None:
+    unlisted = fmu_factory.redescribed(
+        gain, folder / "unlisted.fmu", ('index="2" dependencies="1"/>', 'index="2"/>')
+    )
     parts = {name: Component(part(name, unlisted)) for name in ("a", "b", "c")}
     links = [link("c.y", "a.u"), link("b.y", "c.u")]
     assert order_of(links, parts).connections == (links[1], links[0])

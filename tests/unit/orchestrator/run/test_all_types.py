@@ -20,6 +20,7 @@ from vibroimpact.analysis.dataset.stores.runs import read_runs
 from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign, schedule
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.component_facts import component_facts
 from vibroimpact.orchestrator.ssp import export_system
 
 WHOLE = {
@@ -182,6 +183,13 @@ def connected(folder: Path, *lines: str, output: str = "u", exchange: str = "gau
     each = "".join(f"[[connection]]\n{line}\n" for line in lines)
     (folder / "two.toml").write_text(TWO.format(connections=each, output=output, exchange=exchange))
     return Scene.from_file(folder / "two.toml")
+
+
+def test_a_structural_parameter_that_is_a_truth_value_is_no_size(tmp_path: Path) -> None:
+    attributes = 'valueReference="9999" causality="structuralParameter" variability="fixed" start="false"'
+    switch = ("<ModelVariables>", f'<ModelVariables><Boolean name="dae" {attributes}/>')
+    path = redescribed(typed(tmp_path, "3.0"), tmp_path / "dae.fmu", switch)
+    assert set(component_facts(path).sizes) == {"rows", "columns"}
 
 
 @pytest.mark.parametrize("exchange", ["jacobi", "gauss_seidel", "iterated"])
