@@ -25,10 +25,11 @@ from vibroimpact.fmus.html_view import html_table
 from vibroimpact.fmus.printable import printable
 
 _RECORD_KEYS = {
-    "impact": "impacts = true",
-    "stick": "impacts = true",
-    "sample": "time_series (in a scene of components, variables and rate)",
-    "event": "events = true",
+    "impact": "impacts = true under [record]",
+    "stick": "impacts = true under [record]",
+    "sample": "time_series (in a scene of components, variables and rate) under [record]",
+    "event": "events = true under [record]",
+    "chosen_step": 'macro_step = "auto" under [execution] and no sweep',
 }
 
 BLOCK_VALUES = 1 << 22
@@ -176,6 +177,10 @@ class VibroimpactAccessor:
         """
         return self._rows("event", exact, selection)
 
+    def chosen_steps(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the chosen communication steps of one run along `chosen_step`; parameters as for `impacts`."""
+        return self._rows("chosen_step", exact, selection)
+
     def _rows(self, dimension: str, exact: bool, selection: dict[str, Any]) -> xr.Dataset:
         """Return the rows of one run of a ragged array, with the run's coordinates as scalars."""
         dataset = self._dataset
@@ -191,7 +196,7 @@ def _rows_of(dataset: xr.Dataset, dimension: str) -> list[Any]:
     if dimension not in dataset.dims:
         raise DatasetError(
             f"{dimension}s: expected them in the dataset, got none recorded. "
-            f"Set {_RECORD_KEYS[dimension]} under [record] in the scene and run it again."
+            f"Set {_RECORD_KEYS[dimension]} in the scene and run it again."
         )
     return [
         name

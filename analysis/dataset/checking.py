@@ -24,6 +24,7 @@ from vibroimpact.analysis.dataset.schema import (
     RUN_COLUMNS,
     SCORE_COLUMNS,
     STICK_COLUMNS,
+    TRACE_COLUMNS,
     Direction,
     Outcome,
     UnitSystem,
@@ -129,6 +130,7 @@ _GROUPS = (
     ("impact_count", *NEEDED_IMPACT_COLUMNS),
     ("stick_count", *STICK_COLUMNS),
     ("event_count", *EVENT_COLUMNS),
+    ("chosen_step_count", *TRACE_COLUMNS),
     ("connection", "energy_residual"),
     ("compared", *SCORE_COLUMNS),
 )
@@ -230,7 +232,13 @@ def _label_problems(dataset: xr.Dataset) -> list[str]:
 
 
 _Flags = NDArray[np.bool_]
-_CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time", "event": "event_time"}
+_CLOCKS = {
+    "impact": "impact_time",
+    "stick": "stick_start",
+    "sample": "time",
+    "event": "event_time",
+    "chosen_step": "chosen_step_end",
+}
 
 
 def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
@@ -285,6 +293,9 @@ def _row_checks(
         yield name, "stops numbered from 1", value(name) < 1
     if dimension == "stick":
         yield "stick_end", "an end that is not before its start", value("stick_end") < time
+    if dimension == "chosen_step":
+        for name in TRACE_COLUMNS[1:]:
+            yield name, "a number >= 0", ~(value(name) >= 0)
     if dimension == "event":
         yield "event_index", "events at the same time numbered from 0", value("event_index") < 0
         component = dataset.variables["event_component"]

@@ -140,6 +140,8 @@ class RunRecord:
         Largest relative residual of the algebraic loops.
     chosen_steps : ndarray of float, shape (5,), or None
         Columns `STEP_COLUMNS`: communication steps that an error estimate has chosen.
+    step_trace : ndarray of float, shape (step, 3), or None
+        Columns `TRACE_COLUMNS`: end (s), size (s) and estimated error over the tolerance of chosen communication steps.
     final_state : ndarray of float, shape (2 N,), or None
         Whole state of a chain or beam at the end: N displacements (m), then N velocities (m/s), of its masses
         or modes.
@@ -163,6 +165,7 @@ class RunRecord:
     energy_residual: NDArray[np.float64] | None = None
     loop_residual: float | None = None
     chosen_steps: NDArray[np.float64] | None = None
+    step_trace: NDArray[np.float64] | None = None
     final_state: NDArray[np.float64] | None = None
     scores: NDArray[np.float64] | None = None
     formed_samples: tuple[NDArray[Any], ...] | None = None
@@ -270,6 +273,12 @@ _RULES = (
     VariableRule("coupling_step_min", ("run",), "s", "smallest chosen communication step"),
     VariableRule("coupling_step_max", ("run",), "s", "largest chosen communication step"),
     VariableRule("coupling_error", ("run",), "1", "sum of the estimated relative errors of all steps"),
+    _count("chosen_step", "communication steps of chosen sizes that are listed"),
+    VariableRule("chosen_step_end", ("chosen_step",), "s", "end of the communication step"),
+    VariableRule("chosen_step_size", ("chosen_step",), "s", "size of the communication step"),
+    VariableRule(
+        "chosen_step_error", ("chosen_step",), "1", "estimated error of the step over coupling_tolerance"
+    ),
     VariableRule(
         "measurement_flags",
         ("run",),
@@ -337,6 +346,7 @@ NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
 """Columns of impacts that every file has; the other columns came later."""
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
+TRACE_COLUMNS = _columns(("chosen_step",))
 SCORE_COLUMNS = _columns(("run", "comparison"))
 MEASURED_COLUMNS = ("measurement_flags", "drive_amplitude", "drive_lag", "drive_clock_error")
 """Columns of runs that a rig has measured; the last three where an input was wired to the drive."""

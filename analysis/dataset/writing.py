@@ -36,6 +36,7 @@ from vibroimpact.analysis.dataset.schema import (
     SCHEMA_VERSION,
     SCORE_COLUMNS,
     STEP_COLUMNS,
+    TRACE_COLUMNS,
     Direction,
     RunRecord,
     UnitSystem,
@@ -364,6 +365,8 @@ def _coupling_variables(
         none = np.full(len(STEP_COLUMNS), np.nan)
         rows = [none if run.chosen_steps is None else run.chosen_steps for run in runs]
         variables |= _described(dict(zip(STEP_COLUMNS, np.array(rows).T, strict=True)), units)
+    tables = ragged([run.step_trace for run in runs], len(TRACE_COLUMNS))
+    variables |= _ragged_variables("chosen_step", tables, TRACE_COLUMNS, units)
     return variables
 
 

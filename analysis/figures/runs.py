@@ -14,6 +14,7 @@ from vibroimpact.analysis.figures.motion.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.motion.portraits import draw_impact_map, draw_portrait, draw_return_map
 from vibroimpact.analysis.figures.motion.runs import draw_run
 from vibroimpact.analysis.figures.motion.series import sampled_variables
+from vibroimpact.analysis.figures.motion.steps import draw_steps
 from vibroimpact.analysis.figures.motion.strobe import draw_strobe
 from vibroimpact.analysis.figures.orbits.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.study.scores import draw_scores
@@ -107,6 +108,7 @@ register(
                 ),
                 _SINGLE,
             ),
+            "steps": Drawing(draw_steps, lambda data: data.sizes.get("chosen_step", 0) > 0, _SINGLE),
             "portrait": Drawing(draw_portrait, _has_pair, _SINGLE),
             "impact-map": Drawing(draw_impact_map, _has_phases, _SINGLE),
             "return-map": Drawing(draw_return_map, lambda data: data.sizes.get("impact", 0) > 1, _SINGLE),

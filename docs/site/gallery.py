@@ -89,6 +89,11 @@ def kinds() -> dict[str, Picture]:
         "impact-frequency": _of("impact-frequency", "figure_2_7"),
         "strobe": _of("strobe", "bifurcation"),
         "run": _of("run", "chatter"),
+        "steps": _of(
+            "steps",
+            "steps",
+            "vibroimpact run examples/two_oscillators.toml --set execution.macro_step=auto -o steps.nc",
+        ),
         "portrait": _of("portrait", "two_stops"),
         "impact-map": _of("impact-map", "figure_2_11"),
         "return-map": _of("return-map", "figure_2_11"),

@@ -77,6 +77,7 @@ _ARRAYS = (
     "final_state",
     "scores",
     "chosen_steps",
+    "step_trace",
 )
 _arrays_of = attrgetter(*_ARRAYS)
 

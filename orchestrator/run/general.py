@@ -299,6 +299,7 @@ class GeneralRunner(Runner):
             self._events.append(np.array([row]) + COUNTED_FROM_ONE)
 
     def _record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
+        adaptive = self._importer.adaptive
         return RunRecord(
             outcome=outcome,
             message=message,
@@ -310,7 +311,8 @@ class GeneralRunner(Runner):
             else None,
             impacts=impact_rows(self._impacts) if records_impacts(self.scene) else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
-            chosen_steps=None if self._importer.adaptive is None else self._importer.adaptive.record.row(),
+            chosen_steps=None if adaptive is None else adaptive.record.row(),
+            step_trace=None if adaptive is None or self.scene.sweep else adaptive.trace,
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
         )
 

@@ -269,7 +269,12 @@ def test_an_impact_just_after_the_start_of_a_step_ends_it(folder: Path) -> None:
 
 def test_chaos_multiplies_errors_that_the_estimate_has_counted_once() -> None:
     # the estimate bounds the error of the first impacts; later two tolerances give two motions, which it does not tell
-    hit = {"stiffness": 1.094, "damping": 0.099, "forcing.amplitude": 1.695, "forcing.angular_frequency": 2.605}
+    hit = {
+        "stiffness": 1.094,
+        "damping": 0.099,
+        "forcing.amplitude": 1.695,
+        "forcing.angular_frequency": 2.605,
+    }
     parts = [
         oscillator("a", **hit, **external(0.252)),
         stop("s", 0.818),

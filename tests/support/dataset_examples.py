@@ -175,6 +175,7 @@ def everything(**changes: Any) -> xr.Dataset:
     runs[0].events, runs[0].energy_residual = coupled.events, coupled.energy_residual
     runs[0].loop_residual = coupled.loop_residual
     runs[0].chosen_steps = np.array([12.0, 2.0, 1e-3, 0.25, 3e-7])
+    runs[0].step_trace = np.array([[0.001, 0.001, 0.5], [0.251, 0.25, 0.9]])
     runs[0].scores = np.array([[98.5, 1.01, 8.3e-3, 3e-6, -1.0, 0.4], [97.0, 0.99, 0.0, 0.0, 1.0, 0.1]])
     runs[0].final_state, runs[1].final_state = np.array([1.0, -1.0, 0.5, 0.25]), np.zeros(4)
     dataset = dataset_of(

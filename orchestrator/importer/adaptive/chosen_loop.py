@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from ctypes import c_void_p
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.fmus.core.coupling import (
     CallKind,
@@ -63,7 +65,7 @@ class ChosenLoop:
         self._whole, self._before, self._halves = (np.zeros(count) for _ in range(3))
         self._times, self._flags = np.zeros(2 * len(paths)), np.zeros(len(paths), np.int32)
         self._at_event = np.zeros(len(paths), np.int32)
-        arrays = {
+        arrays: dict[str, NDArray[Any]] = {
             "at_event": self._at_event,
             "kept_times": self._times,
             "kept_flags": self._flags,

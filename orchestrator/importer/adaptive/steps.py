@@ -133,6 +133,11 @@ class AdaptiveSteps:
         self.record = StepRecord()
         self._loop: ChosenLoop | None = None
 
+    @property
+    def trace(self) -> Floats:
+        """End (s), size (s) and error over the tolerance of the steps of the present run, shape (step, 3)."""
+        return self.record.traced(self._tolerance)
+
     # ---- a run ----
 
     def begin(self, importer: Stepper) -> None:
@@ -254,7 +259,7 @@ class AdaptiveSteps:
         coupling_error = error[0]
         self._accept(time, planned)
         if ticks or importer.event_time >= reached:
-            self.record.add(size, error[0] * self._tolerance, cut=cut)
+            self.record.add(reached, size, error[0] * self._tolerance, cut=cut)
             self._controller.begin_anew(may_reject=is_halved)
             for line in self._all_lines:
                 line.begin_anew(reached)
@@ -266,7 +271,7 @@ class AdaptiveSteps:
             error = max(error, found)
             if line.is_coupling:
                 coupling_error = max(coupling_error, found[0])
-        self.record.add(size, coupling_error * self._tolerance, cut=cut)
+        self.record.add(reached, size, coupling_error * self._tolerance, cut=cut)
         self._controller.accept(size, error[0], cut=cut)
         self._bound_size(reached, size, error)
 

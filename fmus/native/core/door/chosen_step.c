@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "door/coupling_steps.h"
 #include "door/status.h"
 
 enum { GO_ON = VI_COUPLING_GO_ON };

@@ -30,9 +30,10 @@ typedef struct {
     double error; /* largest error over the tolerance, infinite where a half step met an event */
 } vi_chosen_step;
 
-/* Make a step from `start` to `target` of the run and estimate its error. Returns VI_COUPLING_REACHED, with states saved
- * at its start and the scales of an accepted step; VI_COUPLING_LISTEN where the importer must make the step: all are at
- * its start again; VI_COUPLING_STEPPED or VI_COUPLING_FAILED after a bad status. */
+/* Make a step from `start` to `target` of the run and estimate its error. Returns one of:
+ * VI_COUPLING_REACHED: states are saved at its start, and the scales have the values of an accepted step;
+ * VI_COUPLING_LISTEN: all are at its start again, and the importer must make the step;
+ * VI_COUPLING_STEPPED or VI_COUPLING_FAILED: after a bad status. */
 VI_DOOR int vi_door_chosen_step(const vi_coupling_plan *plan, vi_chosen_step *chosen, vi_coupling_progress *progress,
                                 vi_coupling_run *run);
 

@@ -3,7 +3,6 @@
 #include <float.h>
 #include <math.h>
 
-#include "door/coupling_steps.h"
 #include "door/seconds.h"
 #include "door/status.h"
 

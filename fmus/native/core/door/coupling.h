@@ -119,4 +119,19 @@ typedef struct {
 /* Advance to `end`. Returns one of VI_COUPLING_*. */
 VI_DOOR int vi_door_coupling(const vi_coupling_plan *plan, vi_coupling_progress *progress, vi_coupling_run *run);
 
+/* ---- parts of a step, for steps on trial ---- */
+
+/* Result of a part that went well. */
+enum { VI_COUPLING_GO_ON = -1 };
+
+/* Make calls; VI_COUPLING_FAILED with their place and status in the run. */
+int vi_coupling_make(const vi_coupling_plan *plan, vi_coupling_run *r, const vi_coupling_calls *calls);
+
+/* Save the states of all components, or restore the saved ones. */
+int vi_coupling_save(const vi_coupling_plan *plan, vi_coupling_run *r);
+int vi_coupling_restore(const vi_coupling_plan *plan, vi_coupling_run *r);
+
+/* Step all components from `start` to `target`, or to the first event of any; `reached` is the end. */
+int vi_coupling_step(const vi_coupling_plan *plan, vi_coupling_progress *p, vi_coupling_run *r);
+
 #endif

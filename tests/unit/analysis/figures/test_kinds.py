@@ -325,7 +325,7 @@ def test_a_replay_of_an_older_file_is_drawn_by_the_name_of_its_comparison(tmp_pa
         ),
         (
             ["--periods", "3"],
-            "It goes with run, portrait, impact-map, return-map, spectrum, density, energies.",
+            "It goes with run, steps, portrait, impact-map, return-map, spectrum, density, energies.",
         ),
         (["--kind", "strobe", "--run", "7"], "expected one run of those there are (0, 1, 2, 3, 4, 5)"),
     ],

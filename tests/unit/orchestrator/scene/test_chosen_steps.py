@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from support import fmu_factory
 
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.analysis import figures
+from vibroimpact.fmus.errors import DatasetError, SceneError
 from vibroimpact.orchestrator.campaign.manifest import scene_hash
+from vibroimpact.orchestrator.importer.adaptive.record import MOST_TRACED, StepRecord
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.run.summary import engine
+from vibroimpact.orchestrator.running.whole import run_scene
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.ways.all_ways import ways_of
 from vibroimpact.orchestrator.study.ways.way import own_step
@@ -126,3 +129,33 @@ def test_a_study_compares_chosen_steps_with_steps_of_their_mean_size() -> None:
     assert {way.name for way in ways if way.knob == "coupling_tolerance"} == {
         f"chosen steps, {exchange}" for exchange in ("jacobi", "gauss_seidel", "iterated")
     }
+
+
+def test_a_run_lists_its_steps_and_a_sweep_does_not(tmp_path: Path) -> None:
+    opened = run_scene(Scene.from_text(TWO), tmp_path / "run.nc")
+    steps = opened.vibroimpact.chosen_steps()
+    assert steps.sizes["chosen_step"] == opened["coupling_steps"].item()
+    assert steps["chosen_step_end"].values[-1] == 1.0
+    np.testing.assert_allclose(np.diff(steps["chosen_step_end"]), steps["chosen_step_size"][1:], rtol=1e-9)
+    assert float(steps["chosen_step_error"].max()) <= 1.0
+    total = 1e-3 * float(steps["chosen_step_error"].sum())
+    assert total == pytest.approx(opened["coupling_error"].item())
+    above, below = figures.draw(opened, "steps").axes
+    assert above.lines[0].get_xdata().size == steps.sizes["chosen_step"]
+    assert below.lines[1].get_label() == "coupling_tolerance"
+    swept = Scene.from_text(TWO + '[sweep]\n"a.stiffness" = { values = [1.0, 1.1] }\n')
+    opened = run_scene(swept, tmp_path / "sweep.nc")
+    assert "chosen_step_size" not in opened
+    with pytest.raises(DatasetError, match=r"chosen_steps: expected them .* and no sweep in the scene"):
+        figures.draw(opened, "steps", run=0)
+
+
+def test_a_long_trace_leaves_every_second_step_out() -> None:
+    record, count = StepRecord(), 3 * MOST_TRACED
+    for step in range(count):
+        record.add(step + 1.0, 1.0, 0.5, cut=False)
+    traced = record.traced(0.5)
+    assert MOST_TRACED // 2 <= len(traced) <= MOST_TRACED
+    assert set(np.diff(traced[:, 0])) == {4.0}
+    assert traced[0].tolist() == [1.0, 1.0, 1.0]
+    assert record.steps == count
