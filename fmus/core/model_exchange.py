@@ -52,7 +52,7 @@ class CVode(Structure):
             *("create_context", "free_context", "clear_messages", "push_message"),
             *("make_vector", "vector_data", "free_vector", "make_matrix", "free_matrix"),
             *("make_linear", "free_linear", "create", "free", "init", "begin_anew"),
-            *("set_tolerances", "set_roots", "set_directions", "roots_found", "motion"),
+            *("set_weights", "set_roots", "set_directions", "roots_found", "motion"),
             *("set_linear", "set_user", "set_stop", "set_longest"),
             *("no_root_warning", "set_warnings", "current_time", "advance"),
         )
@@ -98,13 +98,13 @@ class Exchange(Structure):
         *((name, c_int64) for name in ("instant_count", "sample_count")),
         *((name, c_int32) for name in ("most_iterations", "version", "needs_completed", "restorable")),
         *((name, c_double) for name in ("tolerance", "time", "next_event")),
-        *((name, c_void_p) for name in ("context", "solver", "vector", "tolerances", "matrix", "linear")),
+        *((name, c_void_p) for name in ("context", "solver", "vector", "matrix", "linear")),
         ("point_vector", c_void_p),
         *((name, c_int32) for name in ("has_begun", "in_event_mode", "ends", "begins_anew")),
         *((name, c_int32) for name in ("inputs_changed", "nominals_changed")),
         *((name, c_int32) for name in ("gives_forces", "meets")),
         *((name, c_int32) for name in ("function", "reason", "solver_flag", "cause", "failure")),
-        *((name, c_int64) for name in ("derivative_calls", "solver_steps")),
+        *((name, c_int64) for name in ("derivative_calls", "solver_steps", "first_step")),
     ]
 
 

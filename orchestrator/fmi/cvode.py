@@ -33,7 +33,7 @@ FUNCTIONS = {
     "free": "CVodeFree",
     "init": "CVodeInit",
     "begin_anew": "CVodeReInit",
-    "set_tolerances": "CVodeSVtolerances",
+    "set_weights": "CVodeWFtolerances",
     "set_roots": "CVodeRootInit",
     "set_directions": "CVodeSetRootDirection",
     "roots_found": "CVodeGetRootInfo",

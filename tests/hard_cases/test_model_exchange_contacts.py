@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from support import fmu_factory
 from support.coupled_parts import VERSIONS, values
 from support.exchanged_parts import (
+    ALONG,
     GRAVITY,
     TIP,
     ContactRun,
@@ -146,6 +147,27 @@ def test_a_body_of_ours_and_one_in_model_exchange_keep_their_momentum(
         assert after[1] - after[0] == pytest.approx(0.7 * (before[0] - before[1]), rel=1e-12)
     assert effective == pytest.approx(mass or 1.0 / (1.0 - 0.3**2), rel=1e-9)
     run.importer.free()
+
+
+@pytest.mark.parametrize(("law", "stiffness"), [("kelvin_voigt", 1e4), ("hertz", 1e6)])
+@fmi_versions
+def test_two_bodies_in_model_exchange_keep_the_energy_of_an_elastic_contact_to_the_tolerance(
+    folder: Path, fmi: str, law: Any, stiffness: float
+) -> None:
+    points = [BodyPoint(name, *ALONG, "u", 1.0) for name in ("m", "o")]
+    errors = []
+    for tolerance in (1e-6, 1e-10):
+        mass = exchanged(folder, fmi, "spring", tolerance, x=0.0, v=2.0)
+        parts = [mass, replace(mass, name="o", parameters={**mass.parameters, "v": 0.0})]
+        run = run_of(parts, [], pairs=[PairSpec(points[0], points[1], 0.1, law, stiffness=stiffness)]).at(0.3)
+        states = [*run.motion(), *values(run.importer, "o", *ALONG)]
+        errors.append(abs(0.25 * sum(value**2 for value in states) - 1.0))
+        assert run.importer.contacts.pairs.specified[0].impacts.all[0].restitution == pytest.approx(
+            1.0, rel=1e-4
+        )
+        run.importer.free()
+    assert errors[0] <= 1e-5
+    assert errors[1] <= 1e-9
 
 
 # ---- memory that cannot be given back ----

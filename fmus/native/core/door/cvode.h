@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 typedef int (*vi_cvode_derivatives)(double time, void *states, void *derivatives, void *user);
+typedef int (*vi_cvode_weights)(void *states, void *weights, void *user);
 typedef int (*vi_cvode_roots)(double time, void *states, double *roots, void *user);
 typedef void (*vi_cvode_message)(int line, const char *function, const char *file, const char *text, int code,
                                  void *user, void *context);
@@ -25,7 +26,7 @@ typedef struct {
     void (*free)(void **);
     int (*init)(void *, vi_cvode_derivatives, double, void *);
     int (*begin_anew)(void *, double, void *);
-    int (*set_tolerances)(void *, double, void *);
+    int (*set_weights)(void *, vi_cvode_weights);
     int (*set_roots)(void *, int, vi_cvode_roots);
     int (*set_directions)(void *, int *);
     int (*roots_found)(void *, int *);

@@ -26,6 +26,10 @@ enum { MOST_SHORT_STEPS = 100 };
 /* A step at whose points the event indicators are unknown is divided by this number, at most so often. */
 static const double DIVIDE = 4.0;
 enum { MOST_DIVISIONS = 40 };
+/* The first steps of CVODE after a start have low orders, and errors of one sign. They get this share of the
+ * tolerance, down to the finest relative tolerance of a step. */
+static const double FIRST_SHARE = 0.1, FINEST = 1e-14;
+enum { FIRST_STEPS = 20 };
 
 /* FMI 2.0's answer of an event iteration. */
 typedef struct {
@@ -100,6 +104,20 @@ static int roots_at(double time, void *states, double *roots, void *user)
     return answer(e, status, VI_EXCHANGE_GET, e->values, e->watched_count);
 }
 
+/* The weights of errors: one step of CVODE may have errors whose weighted mean is 1. */
+static int weights_at(void *states, void *weights, void *user)
+{
+    const vi_exchange *e = user;
+    const bool is_first = e->solver_steps - e->first_step < FIRST_STEPS;
+    const double share = is_first ? fmax(FIRST_SHARE, FINEST / e->tolerance) : 1.0;
+    const double *x = e->cvode->vector_data(states);
+    double *weight = e->cvode->vector_data(weights);
+    for (int64_t i = 0; i < e->state_count || i == 0; i++) {
+        weight[i] = 1.0 / (share * (e->tolerance * fabs(x[i]) + e->absolute[i]));
+    }
+    return GOOD;
+}
+
 /* CVODE's own messages are not printed: its flag says all. */
 static void ignore_message(int line, const char *function, const char *file, const char *text, int code, void *user,
                            void *context)
@@ -125,17 +143,15 @@ static int make_solver(vi_exchange *e)
     c->clear_messages(e->context);
     c->push_message(e->context, ignore_message, NULL);
     e->vector = c->make_vector(count, e->states, e->context);
-    e->tolerances = c->make_vector(count, e->absolute, e->context);
     e->point_vector = c->make_vector(count, e->point, e->context);
     e->matrix = c->make_matrix(count, count, e->context);
     e->linear = c->make_linear(e->vector, e->matrix, e->context);
     e->solver = c->create(BDF, e->context);
-    if (e->vector == NULL || e->tolerances == NULL || e->point_vector == NULL || e->matrix == NULL || e->linear == NULL
-        || e->solver == NULL) {
+    if (e->vector == NULL || e->point_vector == NULL || e->matrix == NULL || e->linear == NULL || e->solver == NULL) {
         return solver_failed(e, 0);
     }
     int flag = c->init(e->solver, derivatives_at, e->time, e->vector);
-    flag = flag != 0 ? flag : c->set_tolerances(e->solver, e->tolerance, e->tolerances);
+    flag = flag != 0 ? flag : c->set_weights(e->solver, weights_at);
     flag = flag != 0 ? flag : c->set_roots(e->solver, (int)(e->indicator_count + e->watch_count), roots_at);
     flag = flag != 0 || e->watch_count == 0 ? flag : c->set_directions(e->solver, e->directions);
     flag = flag != 0 ? flag : c->set_linear(e->solver, e->linear, e->matrix);
@@ -160,16 +176,13 @@ void vi_door_exchange_end(vi_exchange *e)
     if (e->point_vector != NULL) {
         c->free_vector(e->point_vector);
     }
-    if (e->tolerances != NULL) {
-        c->free_vector(e->tolerances);
-    }
     if (e->vector != NULL) {
         c->free_vector(e->vector);
     }
     if (e->context != NULL) {
         c->free_context(&e->context);
     }
-    e->solver = e->linear = e->matrix = e->tolerances = e->vector = e->point_vector = e->context = NULL;
+    e->solver = e->linear = e->matrix = e->vector = e->point_vector = e->context = NULL;
     e->has_begun = 0;
 }
 
@@ -196,11 +209,11 @@ static int restart_solver(vi_exchange *e)
 {
     const vi_cvode *c = e->cvode;
     e->begins_anew = 0;
+    e->first_step = e->solver_steps;
     if (e->solver == NULL) {
         return make_solver(e);
     }
-    int flag = c->begin_anew(e->solver, e->time, e->vector);
-    flag = flag != 0 ? flag : c->set_tolerances(e->solver, e->tolerance, e->tolerances);
+    const int flag = c->begin_anew(e->solver, e->time, e->vector);
     return flag == 0 ? OK : solver_failed(e, flag);
 }
 

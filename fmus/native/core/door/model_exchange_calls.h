@@ -107,7 +107,7 @@ typedef struct {
     double tolerance;                        /* relative */
 
     double time, next_event; /* s; next_event may be infinite */
-    void *context, *solver, *vector, *tolerances, *matrix, *linear, *point_vector;
+    void *context, *solver, *vector, *matrix, *linear, *point_vector;
     int32_t has_begun, in_event_mode, ends, begins_anew, inputs_changed, nominals_changed;
     int32_t gives_forces; /* some force input is not 0 */
     int32_t meets; /* the last step has ended where a contact point meets its surface */
@@ -115,6 +115,7 @@ typedef struct {
     int32_t cause;   /* function at whose answer CVODE took a shorter step; -1: none */
     int32_t failure; /* status of the FMU at which CVODE gave up */
     int64_t derivative_calls, solver_steps;
+    int64_t first_step; /* solver_steps where the solver has begun anew */
 } vi_exchange;
 
 /* Statuses of FMI. */
