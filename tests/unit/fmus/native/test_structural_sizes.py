@@ -200,7 +200,7 @@ def test_no_contact_is_a_free_body(large: Path, small: Path) -> None:
 
 
 def test_contacts_that_are_left_out_need_no_importer_with_events(tmp_path: Path) -> None:
-    starts = {**STOP, **SECOND, "contact[2].law": "external"}
+    starts: dict[str, float | str] = {**STOP, **SECOND, "contact[2].law": "external"}
     path = export_fmu("beam", tmp_path / "e.fmu", modes=4, starts=starts, external=True, structural=True)
     with configured(path, {"contacts": 1}) as fmu:
         assert run(fmu)[-1][2] > 2
