@@ -9,7 +9,7 @@
 
 typedef struct {
     double time, parameter, input;
-    int64_t count;
+    int64_t count, size;
     int32_t flag;
     int64_t used;      /* rows */
     double rows[1000]; /* last member: saved as far as it is used */
@@ -19,8 +19,9 @@ static const vi_variable thing_variables[] = {
     {VI_FLOAT64, VI_READ_ONLY, 1, offsetof(thing, time)},   {VI_FLOAT64, VI_SET_INITIAL, 1, offsetof(thing, parameter)},
     {VI_FLOAT64, VI_SET_INPUT, 1, offsetof(thing, input)},  {VI_INT64, VI_READ_ONLY, 1, offsetof(thing, count)},
     {VI_BOOLEAN, VI_SET_TUNABLE, 1, offsetof(thing, flag)}, {VI_FLOAT64, VI_READ_ONLY, 1000, offsetof(thing, rows)},
+    {VI_INT64, VI_SET_STRUCTURAL, 1, offsetof(thing, size)},
 };
-enum { VARIABLES = sizeof thing_variables / sizeof thing_variables[0] };
+enum { VARIABLES = sizeof thing_variables / sizeof thing_variables[0], SIZE = VARIABLES - 1 };
 
 static void defaults(void *self)
 {
@@ -250,6 +251,39 @@ static void any_start_values_do_no_harm(uint64_t *seed, const char *folder)
     }
 }
 
+static void set_size(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (int64_t *)values + first, count * sizeof(int64_t));
+}
+
+/* Set the size in each mode; returns the modes that take it. */
+static int modes_that_take_a_size(vi_instance *instance)
+{
+    const uint32_t reference = SIZE;
+    int modes = 0;
+    for (int mode = 1; mode <= VI_MODE_CONFIGURATION; mode *= 2) {
+        int64_t size = mode;
+        instance->mode = (vi_mode_of_use)mode;
+        const bool taken = vi_instance_set(instance, "set", VI_INT64, &reference, 1, &size, 1, set_size);
+        CHECK(!taken || ((thing *)instance->self)->size == mode, "mode %d", mode);
+        modes += taken ? mode : 0;
+    }
+    return modes;
+}
+
+static void a_size_is_set_before_initialization_where_it_is_structural(const char *folder)
+{
+    vi_instance *instance = started();
+    CHECK(modes_that_take_a_size(instance) == VI_BEFORE_START, "%s", "a parameter");
+    vi_instance_free(instance);
+    write_member(folder, "sizes.txt", "structural 1\n");
+    instance = vi_instance_new("thing");
+    CHECK(vi_instance_describe(instance, "instantiate", folder, false) && instance->structural, "%s", "structural");
+    CHECK(modes_that_take_a_size(instance) == (VI_MODE_INSTANTIATED | VI_MODE_CONFIGURATION), "%s", "structural");
+    write_member(folder, "sizes.txt", "");
+    vi_instance_free(instance);
+}
+
 static void described_references_are_places_in_the_list(const char *folder)
 {
     write_member(folder, "references.txt", "3\n0\n999999999\n999\n1\n");
@@ -306,6 +340,7 @@ int main(int count, char *arguments[])
     any_start_values_do_no_harm(&seed, folder);
     described_references_are_places_in_the_list(folder);
     any_references_do_no_harm(&seed, folder);
+    a_size_is_set_before_initialization_where_it_is_structural(folder);
     random_references_and_sizes_are_errors_or_right(&seed);
     states_come_back_and_damaged_ones_do_not(&seed);
     bytes_come_back_from_their_packed_form(&seed);

@@ -324,23 +324,10 @@ static bool start(void *self, vi_body *c, double start_time, char *message)
     return message[0] == '\0';
 }
 
-/* Contacts beyond those in use have no law. */
-static bool use_contacts(vi_body *c, char *message)
-{
-    if (c->contacts_used < 0 || c->contacts_used > c->contacts_described) {
-        vi_complain(message, "contacts: expected 0 to %d, got %lld", c->contacts_described, (long long)c->contacts_used);
-        return false;
-    }
-    for (int64_t k = c->contacts_used; k < VI_PORTS; ++k) {
-        c->contacts[k].law.law = 0;
-    }
-    return true;
-}
-
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     vi_body *c = vi_body_of(self);
-    if (!use_contacts(c, message) || !form->prepare(self, message) || !start(self, c, start_time, message)) {
+    if (!vi_body_use_contacts(c, message) || !form->prepare(self, message) || !start(self, c, start_time, message)) {
         return false;
     }
     hold_inputs(self, c);
@@ -462,11 +449,9 @@ static bool clock_is_due(const void *self)
 static double tick(void *self)
 {
     vi_body *c = vi_body_of(self);
-    if (!vi_strobe_is_due(c)) {
-        c->strobe.ticks = 0;
-        return 0.0;
+    if (vi_strobe_is_due(c)) {
+        update_outputs(self);
     }
-    update_outputs(self);
     return vi_strobe_tick(c);
 }
 

@@ -68,6 +68,18 @@ void vi_body_check_inputs(const vi_body *c, char message[VI_MESSAGE_LENGTH])
     }
 }
 
+bool vi_body_use_contacts(vi_body *c, char message[VI_MESSAGE_LENGTH])
+{
+    if (c->contacts_used < 0 || c->contacts_used > c->contacts_described) {
+        vi_complain(message, "contacts: expected 0 to %d, got %lld", c->contacts_described, (long long)c->contacts_used);
+        return false;
+    }
+    for (int64_t k = c->contacts_used; k < VI_PORTS; ++k) {
+        c->contacts[k].law.law = 0;
+    }
+    return true;
+}
+
 void vi_body_check(const vi_body *c, char message[VI_MESSAGE_LENGTH])
 {
     vi_check_not_negative(message, "forcing.angular_frequency", c->forcing_angular_frequency);

@@ -16,4 +16,7 @@ bool vi_body_check_step(const vi_body *c, const vi_step_request *request, vi_ins
 /* Has each contact that asks for an answer received a valid one? */
 bool vi_body_check_answers(const vi_body *c, char message[VI_MESSAGE_LENGTH]);
 
+/* Take the law of each contact beyond those in use. False after complaining of their number. */
+bool vi_body_use_contacts(vi_body *c, char message[VI_MESSAGE_LENGTH]);
+
 #endif

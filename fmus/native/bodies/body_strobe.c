@@ -46,15 +46,18 @@ bool vi_strobe_ends_step(const vi_body *c, const vi_step_request *request, vi_in
 
 void vi_strobe_pass(vi_body *c, const vi_step_request *request)
 {
-    if (!request->stop_at_contacts || !is_strobe(c->state.now)) {
-        c->strobe.passed = c->state.now.periods;
-    }
+    const bool stops = request->stop_at_contacts && is_strobe(c->state.now);
+    const int64_t passed = stops ? c->state.now.periods - 1 : c->state.now.periods;
+    c->strobe.passed = passed > c->strobe.passed ? passed : c->strobe.passed;
 }
 
 double vi_strobe_tick(vi_body *c)
 {
     const vi_instant strobe = {c->strobe.passed + 1, 0.0, 0.0};
-    c->strobe.ticks = 1;
+    c->strobe.ticks = vi_strobe_is_due(c);
+    if (!c->strobe.ticks) {
+        return 0.0;
+    }
     c->strobe.passed = c->state.now.periods;
     c->strobe.displacement = c->displacement;
     c->strobe.velocity = c->velocity;

@@ -32,7 +32,7 @@ bool vi_strobe_ends_step(const vi_body *body, const vi_step_request *request, vi
 /* A step has ended: strobes within the step, at which the importer could not stop, never tick. */
 void vi_strobe_pass(vi_body *body, const vi_step_request *request);
 
-/* Tick with the present outputs. Returns the time since the first strobe that has not ticked, s. */
+/* Tick with the present outputs, if a strobe is due. Returns the time since the first strobe that has not ticked, s. */
 double vi_strobe_tick(vi_body *body);
 
 /* End the tick, and return the time of the next strobe, s; infinite: there is none. */

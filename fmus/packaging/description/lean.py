@@ -80,7 +80,8 @@ def with_structural(component: ComponentDescription) -> ComponentDescription:
     """
     _expect_option(component, "structural", any(v.counts for v in component.variables))
     counted = (
-        replace(v, causality="structuralParameter", versions=(3,)) if v.counts else v for v in component.variables
+        replace(v, causality="structuralParameter", versions=(3,)) if v.counts else v
+        for v in component.variables
     )
     return replace(component, variables=tuple(counted))
 

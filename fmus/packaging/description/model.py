@@ -121,7 +121,9 @@ class Variable:
     @property
     def is_initial_unknown(self) -> bool:
         """Whether ModelStructure lists the variable among the unknowns of initialization."""
-        calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"} and not self.clock
+        calculated_output = (
+            self.causality == "output" and self.initial in {"approx", "calculated"} and not self.clock
+        )
         calculated = calculated_output or self.causality == "calculatedParameter"
         return calculated or bool(self.derivative) or self.type == "Clock"
 

@@ -34,7 +34,17 @@ TYPES = ("Float64", "Int64", "Boolean", "Enumeration", "Clock")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
-    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports", "derivative", "event_indicator", "clock"),
+    *(
+        "repeat",
+        "dimensions",
+        "fmi",
+        "dependencies",
+        "counts",
+        "ports",
+        "derivative",
+        "event_indicator",
+        "clock",
+    ),
 }
 PORTS = ("importer", "external", "strobes", "structural")
 #: Mark in a dependency for every index of a repeated block; `{k}` is the variable's own index.
@@ -291,7 +301,10 @@ def _rules(table: Mapping[str, Any]) -> tuple[Rule, ...]:
         (
             "clock",
             "the name of a clock of the file",
-            lambda e: "clock" not in e or e["clock"] in {v["name"] for v in table["variable"] if v["type"] == "Clock"},
+            lambda e: (
+                "clock" not in e
+                or e["clock"] in {v["name"] for v in table["variable"] if v["type"] == "Clock"}
+            ),
         ),
         ("ports", f"one of {', '.join(PORTS)}, or none", lambda e: e.get("ports", PORTS[0]) in PORTS),
         ("repeat", "a count in [component]", lambda e: _repeat_is_counted(table["component"], e)),

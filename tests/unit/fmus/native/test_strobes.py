@@ -32,16 +32,17 @@ def strobed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def instants(frequency: float, phase: float, first: int, count: int) -> list[float]:
     """Return exact instants of phase zero, to the nearest double: (2 pi k - phase) / frequency, 50 digits."""
     with mp.workdps(50):
-        return [
-            float((2 * mp.pi * k - mpf(phase)) / mpf(frequency)) for k in range(first, first + count)
-        ]
+        return [float((2 * mp.pi * k - mpf(phase)) / mpf(frequency)) for k in range(first, first + count)]
 
 
 def instance(kind: Any, path: Path, folder: Path) -> Any:
     """Return an instance of FMPy that is not made yet."""
     token = read_model_description(path).instantiationToken
     return kind(
-        guid=token, unzipDirectory=extract(path, folder), modelIdentifier="Oscillator", instanceName="instance"
+        guid=token,
+        unzipDirectory=extract(path, folder),
+        modelIdentifier="Oscillator",
+        instanceName="instance",
     )
 
 
@@ -188,11 +189,15 @@ def test_without_early_return_the_clock_ticks_at_ends_of_steps_alone_and_a_warni
     messages: list[str] = []
     fmu = instance(FMU3Slave, strobed, tmp_path)
     fmu.instantiate(
-        eventModeUsed=True, earlyReturnAllowed=False, logMessage=lambda _, __, ___, text: messages.append(text.decode())
+        eventModeUsed=True,
+        earlyReturnAllowed=False,
+        logMessage=lambda _, __, ___, text: messages.append(text.decode()),
     )
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
-    assert "earlyReturnAllowed = false: the clock ticks only where a step ends at nextEventTime" in messages[-1]
+    assert (
+        "earlyReturnAllowed = false: the clock ticks only where a step ends at nextEventTime" in messages[-1]
+    )
     *_, time = fmu.updateDiscreteStates()
     fmu.enterStepMode()
     assert fmu.doStep(0.0, time)[0]
@@ -264,5 +269,7 @@ def test_every_body_has_the_clock(tmp_path: Path, body: str) -> None:
 def test_what_has_no_strobes_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="Gain: strobes: expected a body with it"):
         export_fmu("gain", tmp_path / "g.fmu", strobes=True)
-    with pytest.raises(UsageError, match=r"Oscillator: strobes: expected FMI 3\.0 with this option, got FMI 2\.0"):
+    with pytest.raises(
+        UsageError, match=r"Oscillator: strobes: expected FMI 3\.0 with this option, got FMI 2\.0"
+    ):
         export_fmu("oscillator", tmp_path / "o.fmu", strobes=True, fmi="2.0")

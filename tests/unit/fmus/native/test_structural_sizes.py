@@ -38,7 +38,9 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return export_fmu("beam", tmp_path_factory.mktemp("small") / "small.fmu", modes=4, contacts=1, starts=STOP)
+    return export_fmu(
+        "beam", tmp_path_factory.mktemp("small") / "small.fmu", modes=4, contacts=1, starts=STOP
+    )
 
 
 def configured(path: Path, values: dict[str, int], **options: Any) -> ComponentFmu:
@@ -72,7 +74,9 @@ def test_the_description_is_valid_and_has_them_as_structural_parameters(large: P
     assert "contacts" not in plain
 
 
-def test_16_modes_set_to_4_and_2_contacts_to_1_are_an_export_of_them_to_the_bit(large: Path, small: Path) -> None:
+def test_16_modes_set_to_4_and_2_contacts_to_1_are_an_export_of_them_to_the_bit(
+    large: Path, small: Path
+) -> None:
     with configured(large, FEWER) as one, ComponentFmu(small) as other:
         rows = run(one)
         assert rows == run(other)
@@ -85,7 +89,13 @@ def test_16_modes_set_to_4_and_2_contacts_to_1_are_an_export_of_them_to_the_bit(
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_start_values_of_fmpy_set_them_to_the_bit(large: Path, small: Path, kind: str) -> None:
     # Euler's steps do not depend on the number of states, as a norm of errors does
-    options = {"fmi_type": kind, "solver": "Euler", "stop_time": 0.02, "step_size": 1e-5, "output_interval": 1e-4}
+    options = {
+        "fmi_type": kind,
+        "solver": "Euler",
+        "stop_time": 0.02,
+        "step_size": 1e-5,
+        "output_interval": 1e-4,
+    }
     one = simulate_fmu(str(large), start_values=FEWER, output=OUTPUTS, **options)
     other = simulate_fmu(str(small), output=OUTPUTS, **options)
     assert one["contact[1].count"][-1] > 2
@@ -165,7 +175,12 @@ def test_each_wrong_moment_is_an_error_with_one_line(large: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
-    [("modes", 17, "1 to 16"), ("modes", 0, "1 to 16"), ("contacts", 3, "0 to 2"), ("contacts", -1, "0 to 2")],
+    [
+        ("modes", 17, "1 to 16"),
+        ("modes", 0, "1 to 16"),
+        ("contacts", 3, "0 to 2"),
+        ("contacts", -1, "0 to 2"),
+    ],
 )
 def test_more_than_exported_are_refused(large: Path, name: str, value: int, expected: str) -> None:
     fmu = ComponentFmu(large, initialize=False)
@@ -185,7 +200,7 @@ def test_no_contact_is_a_free_body(large: Path, small: Path) -> None:
 
 
 def test_contacts_that_are_left_out_need_no_importer_with_events(tmp_path: Path) -> None:
-    starts = {**STOP, **SECOND, "contact[2].law": "external"}
+    starts: dict[str, float | str] = {**STOP, **SECOND, "contact[2].law": "external"}
     path = export_fmu("beam", tmp_path / "e.fmu", modes=4, starts=starts, external=True, structural=True)
     with configured(path, {"contacts": 1}) as fmu:
         assert run(fmu)[-1][2] > 2
@@ -199,7 +214,9 @@ def test_without_the_option_and_elsewhere_there_is_no_configuration(tmp_path: Pa
             assert "expected an FMU with structural parameters, got one without" in fmu.messages[-1]
     with pytest.raises(UsageError, match="Gain: structural: expected a body with it"):
         export_fmu("gain", tmp_path / "g.fmu", structural=True)
-    with pytest.raises(UsageError, match=r"Beam: structural: expected FMI 3\.0 with this option, got FMI 2\.0"):
+    with pytest.raises(
+        UsageError, match=r"Beam: structural: expected FMI 3\.0 with this option, got FMI 2\.0"
+    ):
         export_fmu("beam", tmp_path / "b.fmu", structural=True, fmi="2.0")
     with pytest.raises(UsageError, match="contacts: expected a variable of this description"):
         export_fmu("beam", tmp_path / "b.fmu", starts={"contacts": 1})

@@ -12,9 +12,9 @@ import tomli_w
 from mpmath import mp
 from support import fmu_factory
 from support.coupled_parts import link, part, values
+from xarray import Dataset
 
 import vibroimpact as vi
-from xarray import Dataset
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.orchestrator.fmi.clock_calls import ClockedInstance
 from vibroimpact.orchestrator.importer.master import Importer
