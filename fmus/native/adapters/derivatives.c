@@ -151,6 +151,20 @@ static void read(const vi_line *line, const vi_variation *change, size_t count, 
 
 /* ---- variables ---- */
 
+/* Why a variable is no known, or no unknown. */
+VI_RARE static const char *reason_of(const vi_variable *variable, bool known)
+{
+    if (variable->count != 1 || variable->access == VI_SENSITIVITY) {
+        return variable->count != 1 ? "an array" : "a derivative since the start";
+    }
+    switch (variable->access) {
+    case VI_SET_INITIAL: return "a fixed parameter";
+    case VI_READ_ONLY: return known ? "an output" : "an event indicator, or the time";
+    case VI_SET_STATE: return "a state, which follows from the start values now";
+    default: return known ? "it acts as an event, or moves a stop" : "an input, or a parameter";
+    }
+}
+
 /* Find the line of a variable. A state is a known only where it is no result of the start. */
 static bool find_line(vi_instance *instance, const char *function, const end_of_map *end, uint32_t reference,
                       vi_line *line)
@@ -159,18 +173,15 @@ static bool find_line(vi_instance *instance, const char *function, const end_of_
     if (variable == NULL) {
         return false;
     }
-    if (variable->access == VI_SENSITIVITY) {
-        return vi_instance_fail(instance, function, "value reference %lu is no %s here", (unsigned long)reference,
-                                end->kind);
-    }
-    const bool fixed = end->line == vi_this_component.partial->column && variable->access == VI_SET_STATE
-                       && instance->mode == VI_MODE_INITIALIZATION;
+    const bool is_known = end->line == vi_this_component.partial->column;
+    const bool fixed = is_known && variable->access == VI_SET_STATE && instance->mode == VI_MODE_INITIALIZATION;
     clear(line);
-    if (!fixed && variable->count == 1
+    if (!fixed && variable->count == 1 && variable->access != VI_SENSITIVITY
         && end->line(instance->self, (uint32_t)(variable - vi_this_description.variables), line)) {
         return true;
     }
-    return vi_instance_fail(instance, function, "value reference %lu is no %s here", (unsigned long)reference, end->kind);
+    return vi_instance_fail(instance, function, "value reference %lu is no %s here: %s", (unsigned long)reference, end->kind,
+                            reason_of(variable, is_known));
 }
 
 /* ---- alike variables, one behind another in their array ---- */

@@ -28,8 +28,8 @@ enum {
 
 typedef struct vi_instance vi_instance;
 
-/* References of the last derivative in the order of the arrays of their variables: the places in this order, and from each
- * on the number of variables that follow each other in one array. All are in the memory of `references`. */
+/* References of the last derivative, ordered by the arrays of their variables. `place` has the order. `run` counts, from
+ * each place of the order on, variables that follow each other in one array. All are in the memory of `references`. */
 typedef struct {
     uint32_t *references, *place, *run, *head;
     size_t count, room;

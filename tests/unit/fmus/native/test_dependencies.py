@@ -17,7 +17,7 @@ from vibroimpact.fmus.packaging.export import export_fmu
 NONE, EXTERNAL, EXTERNAL_FORCE, PAIR = 0, 5, 6, 7
 INSIDE = (NONE, RESTITUTION, KELVIN_VOIGT, HERTZ, HUNT_CROSSLEY)
 KINDS = {"2.0": "CoSimulation", "3.0": "ModelExchange"}
-"""Kind of an instance of each version: the laws that another component answers need an importer with events in FMI 3.0."""
+"""Kind of an instance of each version: laws that another component answers need an importer with events in FMI 3.0."""
 LAWS = {"ModelExchange": INSIDE, "CoSimulation": (*INSIDE, EXTERNAL, EXTERNAL_FORCE, PAIR)}
 BODIES: dict[str, dict[str, Any]] = {
     "Oscillator": {},
@@ -63,9 +63,9 @@ def knowns_of(it: Integrated) -> Iterator[Any]:
         yield from (unknown.variable.derivative for unknown in it.description.derivatives)
     for variable in it.description.modelVariables:
         tunable = it.new and variable.variability == "tunable" and "stop[" not in variable.name
-        if (variable.causality == "input" or tunable) and not variable.dimensions:
-            if EVENT not in variable.name:
-                yield variable
+        known = (variable.causality == "input" or tunable) and EVENT not in variable.name
+        if known and not variable.dimensions:
+            yield variable
 
 
 def undeclared(it: Integrated) -> set[tuple[str, str]]:

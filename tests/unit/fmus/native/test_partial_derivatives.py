@@ -383,18 +383,26 @@ def test_a_pair_that_the_standard_does_not_allow_is_an_error_with_a_line(
     exported: Callable[..., Path], version: str
 ) -> None:
     it = Integrated("Oscillator", version, exported("oscillator", version, True))
-    assert "is no known here" in it.message(directional, it, ["acceleration"], ["velocity"], [1.0])
+    said = it.message(directional, it, ["acceleration"], ["velocity"], [1.0])
+    assert "is no known here: a state, which follows from the start values now" in said
     it.begin()
-    for known in (
-        "mass",
-        "acceleration",
-        "contact[1].applied_impulse",
-        "forcing.phase",
-        "displacement_start",
+    for known, reason in (
+        ("mass", "a fixed parameter"),
+        ("acceleration", "an output"),
+        ("contact[1].applied_impulse", "it acts as an event"),
+        ("forcing.phase", "a fixed parameter"),
+        ("displacement_start", "a fixed parameter"),
     ):
-        assert "is no known here" in it.message(directional, it, ["acceleration"], [known], [1.0])
-    for unknown in ("force", "mass", "contact[1].event_indicator", "forcing.amplitude"):
-        assert "is no unknown here" in it.message(directional, it, [unknown], ["force"], [1.0])
+        said = it.message(directional, it, ["acceleration"], [known], [1.0])
+        assert f"value reference {it.references[known]} is no known here: {reason}" in said
+    for unknown, reason in (
+        ("force", "an input, or a parameter"),
+        ("mass", "a fixed parameter"),
+        ("contact[1].event_indicator", "an event indicator"),
+        ("forcing.amplitude", "an input, or a parameter"),
+    ):
+        said = it.message(directional, it, [unknown], ["force"], [1.0])
+        assert f"value reference {it.references[unknown]} is no unknown here: {reason}" in said
     assert "not a variable of this type" in it.message(
         directional, it, ["contact[1].count"], ["force"], [1.0]
     )

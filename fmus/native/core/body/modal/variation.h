@@ -20,8 +20,9 @@ typedef struct {
 typedef struct {
     const double *shape; /* numbers of the modes `first` to `first` + `count` - 1 */
     int first, count;
-    /* Variables of its array from this one on that are alike (0: it is alone): variable m has its one number at mode
-     * `first` + m, or (`rows`) row m of a matrix with rows of VI_MODES, times weight[m]. From `used` on all is 0. */
+    /* `alike`: number of variables of its array, from this one on, that are alike; 0: it is alone. Variable m has its one
+     * number at mode `first` + m. With `rows` it has row m of a matrix of VI_MODES columns, times weight[m]. From `used`
+     * on all is 0. */
     int alike, used, rows;
     const double *weight; /* NULL: 1 for all, as it is without `rows` */
     double displacement, velocity, load; /* factors of the shape */
