@@ -65,9 +65,8 @@ class Importer(TrialSteps):
     pairs : sequence of PairSpec
         Bodies that hit each other.
     exchange : str
-        `jacobi`: all inputs have the values of the start of a step, except those of stops and of formulas
-        (`order.fresh_inputs`). `gauss_seidel`: each component gets the newest outputs of components stepped before it.
-        `iterated`: steps are repeated until the inputs at their end agree.
+        `jacobi`: inputs of a step's start, except of stops and formulas (`fresh_inputs`). `gauss_seidel`: the newest
+        outputs of components stepped before. `iterated`: steps are repeated until the inputs at their end agree.
     macro_step : float or "auto"
         Longest communication step, s; "auto": steps follow an estimate of their errors.
     coupling_tolerance : float
