@@ -75,7 +75,7 @@ bool vi_body_use_contacts(vi_body *c, char message[VI_MESSAGE_LENGTH])
         return false;
     }
     for (int64_t k = c->contacts_used; k < VI_PORTS; ++k) {
-        c->contacts[k].law.law = 0;
+        vi_contact_law_clear(&c->contacts[k].law);
     }
     return true;
 }

@@ -117,6 +117,12 @@ static inline bool vi_contact_law_is_none(int64_t law)
     return law == 0;
 }
 
+/* Take the law of a port away. */
+static inline void vi_contact_law_clear(vi_contact_law *law)
+{
+    law->law = 0;
+}
+
 /* Is there a stop for which the body searches itself? */
 static inline bool vi_contact_law_has_stop(int64_t law)
 {

@@ -108,4 +108,4 @@ def test_a_scene_samples_the_poincare_section_at_the_strobes_in_both_kinds(folde
         assert found["counter.last"][-1] == found["body.strobe.velocity"][-1]
         sections.append(np.unique(found["body.strobe.velocity"]))
         assert sections[-1].size == 21
-    np.testing.assert_allclose(*sections, atol=1e-6)
+    np.testing.assert_allclose(sections[0], sections[1], atol=1e-6)
