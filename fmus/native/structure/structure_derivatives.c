@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "body/modal/carry.h"
+
 #include "modal_structure.h"
 
 /* A load by a row of modal forces, whose factor is now `value`; a load of the base moves its outputs too. */
@@ -40,6 +42,38 @@ static bool column_of_signal(modal_structure *s, int k, vi_line *line)
     return line_of_load(s, s->signals.force[k], s->body.state.signal_value[k], s->signals.signal[k].of_base, line);
 }
 
+/* A number of the motion of a stop. The motion goes on from its phase and its place where a frequency or a velocity
+ * changes. */
+static bool column_of_stop(modal_structure *s, size_t within, vi_line *line)
+{
+    const vi_structure parts = vi_body_parts(&s->body);
+    const int k = (int)(within / sizeof(vi_stop_motion));
+    if (k >= parts.model->contacts) {
+        return true;
+    }
+    vi_stop_motion motion = s->stop[k];
+    motion.shift = parts.model->stop_motion[k].shift;
+    const double a = motion.amplitude, w = motion.angular_frequency;
+    const double angle = vi_stop_motion_angle(&parts, &motion), sine = sin(angle), cosine = cos(angle);
+    vi_stop_course course = {0.0, 0.0, 0.0, 0.0};
+    switch (within % sizeof(vi_stop_motion)) {
+    case offsetof(vi_stop_motion, velocity): course.velocity = 1.0; break;
+    case offsetof(vi_stop_motion, amplitude):
+        course = (vi_stop_course){cosine, -w * sine, -w * w * cosine, 0.0};
+        break;
+    case offsetof(vi_stop_motion, angular_frequency):
+        course = (vi_stop_course){0.0, -a * sine, -2.0 * a * w * cosine, 0.0};
+        break;
+    case offsetof(vi_stop_motion, phase):
+        course = (vi_stop_course){-a * sine, -a * w * cosine, a * w * w * sine, 0.0};
+        break;
+    default: return false;
+    }
+    line->port = k;
+    line->force = vi_structure_push_of_stop(&parts, k, &course);
+    return true;
+}
+
 bool vi_structure_column(void *self, size_t offset, vi_line *line)
 {
     modal_structure *s = self;
@@ -56,6 +90,9 @@ bool vi_structure_column(void *self, size_t offset, vi_line *line)
     }
     if (offset - offsetof(modal_structure, sine) < sizeof s->sine) {
         return column_of_sine(s, offset - offsetof(modal_structure, sine), line);
+    }
+    if (offset - offsetof(modal_structure, stop) < sizeof s->stop) {
+        return column_of_stop(s, offset - offsetof(modal_structure, stop), line);
     }
     return vi_body_is_element(offset, offsetof(modal_structure, signals.amplitude), sizeof s->signals.amplitude, &k)
            && column_of_signal(s, k, line);

@@ -273,6 +273,58 @@ def test_adjoint_derivatives_are_the_transposed_directional_ones(
     )
 
 
+MOTION = [f"stop[1].{name}" for name in ("velocity", "amplitude", "angular_frequency", "phase")]
+
+
+def on_moving_stop(it: Integrated, motion: Mapping[str, float], **values: float) -> None:
+    """Put a structure at 0 in continuous-time mode, where its moving stop presses or holds it."""
+    towards = 1e3 if values["side"] == UPPER else -1e3
+    it.set({f"contact[1].{name}": value for name, value in values.items()} | {"force": towards})
+    it.set({f"stop[1].{name}": value for name, value in motion.items()})
+    it.begin()
+    it.move(0.0, *([0.0] * len(it.description.derivatives)))
+
+
+@given(
+    st.sampled_from([KELVIN_VOIGT, HERTZ, HUNT_CROSSLEY]),
+    st.sampled_from([UPPER, LOWER]),
+    st.tuples(*(st.floats(-0.05, 0.05) for _ in range(2)), st.floats(0.5, 5.0), st.floats(-3.0, 3.0)),
+    st.sampled_from(VERSIONS),
+)
+def test_numbers_of_the_motion_of_a_pressed_stop_are_knowns(
+    exported: Callable[..., Path], law: int, side: int, motion: tuple[float, ...], version: str
+) -> None:
+    it = Integrated("Structure", version, exported("structure", version))
+    values = {"law": law, "side": side, "stiffness": 500.0, "damping": 0.2, "exponent": 1.7}
+    place = -0.4 if side == UPPER else 0.4
+    on_moving_stop(
+        it, dict(zip([name[8:] for name in MOTION], motion, strict=True)), position=place, **values
+    )
+    unknowns = ["modal_acceleration[1]", "acceleration", "contact[1].force", "displacement", "velocity"]
+    found, expected = jacobian(it, unknowns, MOTION), by_differences(it, unknowns, MOTION, 1e-5)
+    assert it.get("contact[1].force") > 0.0
+    assert np.abs(found - expected).max() <= 1e-6 * max(np.abs(expected).max(), 1.0)
+    back = np.array([adjoint(it, [name], MOTION, [1.0]) for name in unknowns]) if it.new else found
+    assert np.abs(back - found).max() <= 1e-13 * np.abs(found).max()
+    it.fmu.freeInstance()
+
+
+@pytest.mark.parametrize("side", [UPPER, LOWER])
+def test_a_held_point_follows_the_acceleration_of_its_stop(exported: Callable[..., Path], side: int) -> None:
+    amplitude, frequency = 0.01, 3.0
+    it = Integrated("Structure", "3.0", exported("structure", "3.0"))
+    motion = {"amplitude": amplitude, "angular_frequency": frequency}
+    on_moving_stop(it, motion, law=HELD, side=side, position=-amplitude)
+    assert it.get("contact[1].force") > 0.0
+    unknowns = [*(f"modal_acceleration[{j}]" for j in (1, 2, 3)), "contact[1].force"]  # each shape is 1
+    found = jacobian(it, unknowns, MOTION)
+    of_stop = np.array([0.0, -(frequency**2), -2.0 * amplitude * frequency, 0.0])
+    assert found[:3].sum(axis=0) == pytest.approx(of_stop, rel=1e-13)
+    assert found[3] == pytest.approx(-of_stop / 3.0 if side == UPPER else of_stop / 3.0, rel=1e-13)
+    back = np.array([adjoint(it, [name], MOTION, [1.0]) for name in unknowns])
+    assert back == pytest.approx(found, rel=1e-13)
+
+
 @pytest.mark.parametrize("masses", [2, MASSES])
 @pytest.mark.parametrize("component", BODIES)
 def test_lists_in_any_order_give_the_sums_of_single_calls(

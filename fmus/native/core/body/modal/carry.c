@@ -70,6 +70,7 @@ void vi_structure_carry(const vi_structure *s, vi_variation *change)
         change->load[j] -= model->mode[j].stiffness * change->displacement[j] + drag;
     }
     for (int k = 0; k < model->contacts; ++k) {
+        b[k] = slopes.held[k] ? change->contact[k] : 0.0;
         change->contact[k] = !slopes.pressed[k]
                                  ? 0.0
                                  : change->contact[k] + slopes.stiffness[k] * at_contact(s, k, change->displacement)
@@ -80,7 +81,7 @@ void vi_structure_carry(const vi_structure *s, vi_variation *change)
         return;
     }
     for (int k = 0; k < model->contacts; ++k) {
-        b[k] = at_contact(s, k, change->load);
+        b[k] += at_contact(s, k, change->load);
     }
     vi_solve_active(model->contacts, slopes.g, b, slopes.held, hold);
     for (int k = 0; k < model->contacts; ++k) {
@@ -89,10 +90,23 @@ void vi_structure_carry(const vi_structure *s, vi_variation *change)
     }
 }
 
-/* Carry the held contacts back: their matrix is symmetric. */
-static void hold_back(const vi_structure *s, contact_slopes *slopes, vi_variation *change)
+double vi_structure_push_of_stop(const vi_structure *s, int k, const vi_stop_course *course)
 {
-    double b[VI_PORTS] = {0.0}, hold[VI_PORTS];
+    const double sign = vi_structure_direction(s, k);
+    if (s->state->status[k] == VI_CONTACT_HELD) {
+        return -sign * course->acceleration;
+    }
+    if (s->state->status[k] != VI_CONTACT_YIELDING) {
+        return 0.0;
+    }
+    const vi_contact_force slopes = slopes_of(s, k);
+    return -sign * (slopes.stiffness * course->displacement + slopes.damping * course->velocity);
+}
+
+/* Carry the held contacts back: their matrix is symmetric. */
+static void hold_back(const vi_structure *s, contact_slopes *slopes, vi_variation *change, double hold[])
+{
+    double b[VI_PORTS] = {0.0};
     for (int k = 0; k < s->model->contacts; ++k) {
         b[k] = change->contact[k] - at_contact(s, k, change->load);
     }
@@ -105,14 +119,15 @@ static void hold_back(const vi_structure *s, contact_slopes *slopes, vi_variatio
 void vi_structure_carry_back(const vi_structure *s, vi_variation *change)
 {
     const vi_structure_model *model = s->model;
+    double hold[VI_PORTS] = {0.0};
     contact_slopes slopes;
     find_slopes(s, &slopes);
     if (slopes.any_held) {
-        hold_back(s, &slopes, change);
+        hold_back(s, &slopes, change, hold);
     }
     for (int k = 0; k < model->contacts; ++k) {
         const double sign = vi_structure_direction(s, k);
-        change->contact[k] = slopes.pressed[k] ? change->contact[k] - at_contact(s, k, change->load) : 0.0;
+        change->contact[k] = slopes.pressed[k] ? change->contact[k] - at_contact(s, k, change->load) : hold[k];
         add_shape(s, k, sign * slopes.stiffness[k] * change->contact[k], change->displacement);
         add_shape(s, k, sign * slopes.damping[k] * change->contact[k], change->velocity);
     }

@@ -209,6 +209,15 @@ static vi_instant time_zero(const vi_clock *clock)
     return zero;
 }
 
+double vi_stop_motion_angle(const vi_structure *s, const vi_stop_motion *motion)
+{
+    if (!(motion->angular_frequency > 0.0)) {
+        return motion->phase + motion->shift;
+    }
+    const vi_sine sine = vi_sine_start(&s->model->clock, motion->angular_frequency, motion->phase + motion->shift);
+    return vi_sine_phase(&sine, s->state->now).angle;
+}
+
 vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
 {
     double low;
@@ -218,8 +227,7 @@ vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_mot
     motion.since = was->since;
     if (motion.angular_frequency != was->angular_frequency && is_sine(was) && is_sine(&motion)) {
         const vi_clock *clock = &s->model->clock;
-        const vi_sine sine = vi_sine_start(clock, was->angular_frequency, was->phase + was->shift);
-        const double angle = vi_sine_phase(&sine, s->state->now).angle + motion.phase - was->phase;
+        const double angle = vi_stop_motion_angle(s, was) + motion.phase - was->phase;
         const vi_sine from = vi_sine_from(clock, motion.angular_frequency, s->state->now, angle);
         motion.shift = vi_sine_phase(&from, time_zero(clock)).angle - motion.phase;
     }

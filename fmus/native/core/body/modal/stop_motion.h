@@ -38,6 +38,9 @@ vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_mot
 /* Displacement of a stop by its motion now, m. */
 double vi_stop_motion_displacement(const vi_structure *s, const vi_stop_motion *motion);
 
+/* Angle of the sine of a motion now, rad. */
+double vi_stop_motion_angle(const vi_structure *s, const vi_stop_motion *motion);
+
 /* The motion of the stop of contact k at the present instant. */
 vi_stop_course vi_stop_course_of(const vi_structure *s, int k);
 

@@ -8,8 +8,8 @@
 
 #include "sizes.h"
 
-/* The change. First `load` has modal forces, and `contact` the forces that another component applies. After the equations
- * have carried the change, they have modal accelerations and the forces of the contacts. */
+/* The change. First `load` has modal forces, and `contact` the given forces of pressed contacts. A held contact has there
+ * the acceleration at which its stop comes nearer, m/s^2. After the equations have carried the change, they have modal accelerations and the forces of the contacts. */
 typedef struct {
     double displacement[VI_MODES], velocity[VI_MODES], load[VI_MODES]; /* of the modes */
     double base;              /* acceleration of the base, m/s^2 */
