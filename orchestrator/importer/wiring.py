@@ -127,8 +127,11 @@ class Transfer:
         ]
         names = [slopes[i] for i in sloping]
         self._sloping = self._places(sloping)
+        drawn = [i for i, c in enumerate(self.connections) if c.target[1] in given]
+        self.is_straight = len({*drawn, *sloping}) == len(self.connections)
+        """Does every input follow a straight line over a step of the exchange "iterated"?"""
         self._rates = self.target.group("Float64", names) if names else None
-        self._kept = self._places(i for i, c in enumerate(self.connections) if c.target[1] in given)
+        self._kept = self._places(drawn)
         self._begin_values = self.write.values.copy()
 
     def keep_at_start(self, inputs: Container[str], *, kept: bool) -> None:

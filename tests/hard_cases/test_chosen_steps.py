@@ -170,6 +170,25 @@ def beside(spec: ComponentSpec, source: str, target: str) -> tuple[list[Componen
     return [spec, oscillator("b", displacement_start=1.0)], links
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+@pytest.mark.parametrize("exchange", ["gauss_seidel", "iterated"])
+def test_inputs_without_slopes_have_an_error_of_second_order(
+    folder: Path, exchange: str, tolerance: float
+) -> None:
+    masses = [part(name, fmu_factory.mass(folder), m=1.0, k=1.0, x=x) for name, x in (("a", 1.0), ("b", 0.0))]
+    importer = chosen(
+        masses, [link("a.x", "b.f", -0.1), link("b.x", "a.f", -0.1)], tolerance=tolerance, exchange=exchange
+    )
+    importer.begin()
+    importer.advance(4.0)
+    slow, fast = math.sqrt(0.9), math.sqrt(1.1)
+    error = abs(values(importer, "a", "x")[0] - 0.5 * (math.cos(4.0 * slow) + math.cos(4.0 * fast)))
+    assert importer.adaptive is not None
+    assert importer.adaptive.order == 2
+    assert error < 0.8 * importer.adaptive.record.error
+    importer.free()
+
+
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize("scheme", [DISCARDS, DISCARDS_MUTE])
 @pytest.mark.parametrize("exchange", ["gauss_seidel", "iterated"])

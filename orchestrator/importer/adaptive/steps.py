@@ -90,7 +90,7 @@ class AdaptiveSteps:
     plan : StepPlan
         The work of a step.
     exchange : str
-        The exchange of values: its errors are of first or (`iterated`) second order.
+        The exchange of values. Its errors are of second order with `iterated` and straight inputs, else of first.
     contacts, pairs : sequences
         Contacts of bodies of other tools, whose steps show the path of the contact points.
     tolerance : float
@@ -98,6 +98,8 @@ class AdaptiveSteps:
 
     Attributes
     ----------
+    order : int
+        Power of its size with which the error of a step falls.
     record : StepRecord
         The steps of the present run.
     """
@@ -115,10 +117,11 @@ class AdaptiveSteps:
             raise ComponentError(f"coupling_tolerance: expected a number > 0 and <= 1, got {tolerance!r}.")
         self._parts, self._plan, self._tolerance = parts, plan, tolerance
         sources, points = coupling_sources(parts, contacts), points_of(parts.named, contacts, pairs)
-        order = 3 if exchange == "iterated" and all(c.has_states for c, _, _ in sources) else 2
-        self._controller = StepController(order)
+        is_straight = all(t.is_straight for t in parts.transfers) and all(c.has_states for c, _, _ in sources)
+        self.order = 3 if exchange == "iterated" and is_straight else 2
+        self._controller = StepController(self.order)
         # the difference of one step and its halves, over the error of the one step
-        self._share = 1.0 - 0.5 ** (order - 1)
+        self._share = 1.0 - 0.5 ** (self.order - 1)
         self._halved = Outputs(halved(parts, sources))
         others = Outputs([source for source in sources if not source[0].has_states])
         lines = [
