@@ -207,7 +207,7 @@ static bool follows(const vi_variable *last, const vi_variable *variable)
 }
 
 /* Put the places of variables that follow each other in an array behind each other. */
-static void order_elements(const vi_instance *instance, vi_order *order)
+VI_RARE static void order_elements(const vi_instance *instance, vi_order *order)
 {
     const vi_variable *last[OPEN] = {NULL};
     uint32_t *const next = order->run, *const head = order->head, place[OPEN] = {0};

@@ -182,7 +182,7 @@ static void check_shapes(const modal_structure *s, char *message)
     }
 }
 
-static void check_stop(const modal_structure *s, int k, char *message)
+VI_RARE static void check_stop(const modal_structure *s, int k, char *message)
 {
     const vi_stop_motion *m = &s->stop[k];
     const double w = m->angular_frequency;
@@ -204,7 +204,7 @@ static void check_inputs(const void *self, char message[VI_MESSAGE_LENGTH])
     vi_check_finite(message, "force_rate", s->force_rate);
 }
 
-static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
+VI_RARE static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
 {
     const modal_structure *s = self;
     vi_check_finite(message, "forcing.amplitude", s->forcing_amplitude);
@@ -232,7 +232,7 @@ static void check_forcing(const void *self, char message[VI_MESSAGE_LENGTH])
 
 /* ---- moving stops ---- */
 
-static void check_table(const modal_structure *s, int k, char *message)
+VI_RARE static void check_table(const modal_structure *s, int k, char *message)
 {
     const int64_t first = s->stop[k].first, count = s->stop[k].knots;
     if (count == 0) {

@@ -44,7 +44,7 @@ static bool column_of_signal(modal_structure *s, int k, vi_line *line)
 
 /* A number of the motion of a stop. The motion goes on from its phase and its place where a frequency or a velocity
  * changes. */
-static bool column_of_stop(modal_structure *s, size_t within, vi_line *line)
+VI_RARE static bool column_of_stop(modal_structure *s, size_t within, vi_line *line)
 {
     const vi_structure parts = vi_body_parts(&s->body);
     const int k = (int)(within / sizeof(vi_stop_motion));

@@ -90,7 +90,7 @@ void vi_structure_carry(const vi_structure *s, vi_variation *change)
     }
 }
 
-double vi_structure_push_of_stop(const vi_structure *s, int k, const vi_stop_course *course)
+VI_RARE double vi_structure_push_of_stop(const vi_structure *s, int k, const vi_stop_course *course)
 {
     const double sign = vi_structure_direction(s, k);
     if (s->state->status[k] == VI_CONTACT_HELD) {

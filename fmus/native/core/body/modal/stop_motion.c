@@ -209,7 +209,7 @@ static vi_instant time_zero(const vi_clock *clock)
     return zero;
 }
 
-double vi_stop_motion_angle(const vi_structure *s, const vi_stop_motion *motion)
+VI_RARE double vi_stop_motion_angle(const vi_structure *s, const vi_stop_motion *motion)
 {
     if (!(motion->angular_frequency > 0.0)) {
         return motion->phase + motion->shift;
@@ -218,7 +218,7 @@ double vi_stop_motion_angle(const vi_structure *s, const vi_stop_motion *motion)
     return vi_sine_phase(&sine, s->state->now).angle;
 }
 
-vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
+VI_RARE vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_motion *was, vi_stop_motion motion)
 {
     double low;
     const double time = vi_clock_time_twofold(&s->model->clock, s->state->now, &low);
@@ -238,7 +238,7 @@ vi_stop_motion vi_stop_motion_continued(const vi_structure *s, const vi_stop_mot
     return motion;
 }
 
-double vi_stop_motion_displacement(const vi_structure *s, const vi_stop_motion *motion)
+VI_RARE double vi_stop_motion_displacement(const vi_structure *s, const vi_stop_motion *motion)
 {
     vi_given_mode sine = {.motion = *motion}, driven = {.motion = *motion};
     double sum = 0.0;
