@@ -34,7 +34,8 @@ class Integrated:
         fmu = unpack(path or fmu_path(component, version))
         self.description = fmpy.read_model_description(str(fmu.folder))
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.new, self.messages = version == "3.0", []
+        self.new = version == "3.0"
+        self.messages: list[str] = []
         of = {"ModelExchange": (FMU2Model, FMU3Model), "CoSimulation": (FMU2Slave, FMU3Slave)}[kind][self.new]
         self.fmu = of(
             guid=fmu.token,
