@@ -1,10 +1,11 @@
-"""CVODE of SUNDIALS 7, as FMPy carries it: loaded once, and handed to C code as addresses."""
+"""CVODE of SUNDIALS 7, as FMPy or scikit-sundae carries it: loaded once, and handed to C code as addresses."""
 
 from __future__ import annotations
 
 import ctypes
 import importlib.util
 import platform
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -57,10 +58,27 @@ def platform_folder() -> str:
     return f"{names.get(machine, machine)}-{system}"
 
 
-def _folder() -> Path:
-    spec = importlib.util.find_spec("fmpy")
+def package_folder(name: str) -> Path | None:
+    """Return the folder of an installed package, which is not imported."""
+    spec = importlib.util.find_spec(name)
     places = spec.submodule_search_locations if spec is not None else None
-    return Path(next(iter(places or ()), "")) / "sundials" / platform_folder()
+    return Path(next(iter(places))) if places else None
+
+
+def _files() -> list[Path]:
+    """Return the libraries in the order of their names: FMPy's, or where it has none those of scikit-sundae's wheel."""
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    fmpy, sundae = (package_folder(name) for name in ("fmpy", "sksundae"))
+    own = (fmpy or Path()) / "sundials" / platform_folder()
+    if own.is_dir() or sundae is None:
+        return [own / f"sundials_{name}{suffix}" for name in LIBRARIES]
+    # wheels put a mark behind the names of the libraries that they carry
+    places = (sundae.parent / "scikit_sundae.libs", sundae / ".dylibs")
+    carried = [file for place in places if place.is_dir() for file in sorted(place.iterdir())]
+    return [
+        next((file for file in carried if re.match(rf"(lib)?sundials_{name}[-.]", file.name)), own / name)
+        for name in LIBRARIES
+    ]
 
 
 @cache
@@ -70,10 +88,9 @@ def cvode() -> CVode:
     Raises
     ------
     ComponentError
-        FMPy has no library for this machine, or one of another version.
+        Neither FMPy nor scikit-sundae has a library for this machine, or it has another version.
     """
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    files = [_folder() / f"sundials_{name}{suffix}" for name in LIBRARIES]
+    files = _files()
     try:
         libraries = [ctypes.CDLL(str(file)) for file in files]
         found = {field: _address(libraries, name) for field, name in FUNCTIONS.items()}
@@ -82,11 +99,12 @@ def cvode() -> CVode:
         raise ComponentError(
             f"model exchange: expected CVODE of SUNDIALS {MAJOR_VERSION} for this machine in FMPy "
             f"(fmpy/sundials/{platform_folder()}), got: {error}. FMPy carries it for x86_64-linux, x86_64-windows and "
-            'aarch64-darwin; elsewhere an FMU runs with run_as = "co_simulation".'
+            "aarch64-darwin; elsewhere install scikit-sundae (extra cvode), or run the FMU with "
+            'run_as = "co_simulation".'
         ) from error
     if major != MAJOR_VERSION:
         raise ComponentError(
-            f"model exchange: expected CVODE of SUNDIALS {MAJOR_VERSION} in FMPy, got SUNDIALS {major}."
+            f"model exchange: expected CVODE of SUNDIALS {MAJOR_VERSION} in {files[0].parent}, got SUNDIALS {major}."
         )
     return CVode(**found)
 

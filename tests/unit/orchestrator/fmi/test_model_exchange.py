@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from ctypes import c_void_p
 from pathlib import Path
 
@@ -309,6 +310,26 @@ def test_a_machine_without_the_library_gets_an_error_that_names_it(
     with pytest.raises(ComponentError, match=r"expected CVODE of SUNDIALS 7 .*fmpy/sundials/riscv64-linux"):
         Component(spec(folder, "3.0"))
     cvode.cvode.cache_clear()
+
+
+@pytest.mark.parametrize("place", ["scikit_sundae.libs", "sksundae/.dylibs"])
+def test_where_fmpy_has_no_library_that_of_scikit_sundae_serves(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    fmpy = cvode.package_folder("fmpy")
+    assert fmpy is not None
+    wheel = tmp_path / place
+    wheel.mkdir(parents=True)
+    for file in (fmpy / "sundials" / cvode.platform_folder()).iterdir():
+        name = file.name if file.name.startswith("lib") else f"lib{file.name}"
+        shutil.copy(file, wheel / name.replace(file.suffix, f"-0a1b2c3d{file.suffix}.7.9.0"))
+    places = {"fmpy": tmp_path / "fmpy", "sksundae": tmp_path / "sksundae"}
+    monkeypatch.setattr(cvode, "package_folder", places.__getitem__)
+    cvode.cvode.cache_clear()
+    component = Component(spec(folder, "3.0"))
+    cvode.cvode.cache_clear()
+    assert component.name == "m"
+    component.free()
 
 
 SCENE = """
