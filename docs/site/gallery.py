@@ -134,9 +134,9 @@ def kinds() -> dict[str, Picture]:
         "basins": _of("basins", "basins", "vibroimpact basins examples/basins.toml -o basins.nc"),
         "basin_shares": _of(
             "basin_shares",
-            "shares",
+            "basin_shares",
             "vibroimpact basins examples/basins.toml --parameter forcing.angular_frequency --from 0.9 --to 1.6 "
-            "--points 20 -o shares.nc",
+            "--points 20 -o basin_shares.nc",
         ),
         "control": _of(
             "control",
